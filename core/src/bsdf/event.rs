@@ -1,0 +1,98 @@
+//! What a scattering event is called in a path expression, and what it carries.
+
+use crate::math::colour::Rgb;
+use glam::Vec3;
+
+/// A scattering letter of a path expression.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Letter {
+    /// `D`: broad, reflected or transmitted.
+    Diffuse,
+    /// `S`: a microfacet lobe of finite roughness.
+    Glossy,
+    /// `S_M`: ideally specular; its density is a Dirac delta.
+    Specular,
+}
+
+/// A set of letters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Letters(u8);
+
+impl Letters {
+    /// No letter.
+    pub const NONE: Self = Self(0);
+    /// Every letter.
+    pub const ALL: Self = Self(0b111);
+
+    /// The set of one letter.
+    pub const fn of(letter: Letter) -> Self {
+        Self(1 << letter as u8)
+    }
+
+    /// Letters in either set.
+    pub const fn union(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
+    /// Whether `letter` is in the set.
+    pub const fn has(self, letter: Letter) -> bool {
+        self.0 & (1 << letter as u8) != 0
+    }
+}
+
+/// Which way light is carried along a walk.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Transport {
+    /// A walk from the eye: `wi` points to where light comes from. Refraction scales radiance by (η_o/η_i)².
+    Radiance,
+    /// A walk from the light: no such factor.
+    Importance,
+}
+
+/// `f · |cos θ_i|` of one pair of directions, by letter. A delta lobe has no value here.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Scattered {
+    /// Letter `D`.
+    pub diffuse: Rgb,
+    /// Letter `S` with finite density.
+    pub glossy: Rgb,
+}
+
+impl Scattered {
+    /// Over all letters.
+    #[inline]
+    pub fn total(self) -> Rgb {
+        self.diffuse + self.glossy
+    }
+}
+
+/// A sampled direction.
+#[derive(Clone, Copy, Debug)]
+pub struct BsdfSample {
+    /// The direction, unit length, away from the surface, in the shading frame.
+    pub wi: Vec3,
+    /// Where it came from.
+    pub kind: SampleKind,
+    /// Refractive index of the side of `wi` over that of the side of `wo`; 1 for reflection and thin walls.
+    pub eta: f32,
+}
+
+/// Of a smooth lobe or of a delta lobe.
+#[derive(Clone, Copy, Debug)]
+pub enum SampleKind {
+    /// Finite density: `value` and `pdf` are those of **all** smooth lobes together at `wi`
+    /// (what `eval` and `pdf` return), `pdf` over solid angle.
+    Smooth {
+        /// f · |cos θ_i|, by letter.
+        value: Scattered,
+        /// Density over solid angle.
+        pdf: f32,
+    },
+    /// Letter `S_M`: `weight` is f · |cos θ_i| over the discrete probability of this choice.
+    Specular {
+        /// Throughput factor.
+        weight: Rgb,
+        /// Discrete probability of the choice.
+        probability: f32,
+    },
+}

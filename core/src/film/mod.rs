@@ -1,0 +1,1 @@
+//! Which samples, their sums, partial EXR, merging, error, developing.

@@ -1,0 +1,1 @@
+//! glTF bytes to a scene, with limits and named errors.

@@ -1,0 +1,7 @@
+//! Frames, warps and their densities, weighted choice, robust arithmetic. Knows no light.
+
+pub mod choice;
+pub mod colour;
+pub mod frame;
+pub mod robust;
+pub mod warp;

@@ -1,0 +1,1 @@
+//! The ways to estimate light, each short, because `path` does the work.

@@ -1,0 +1,1 @@
+//! What all methods share: vertices, next event, weights.

@@ -1,0 +1,1 @@
+//! A batch of samples to its sum, on any number of threads.

@@ -1,0 +1,1 @@
+//! Numbers as a function of (seed, replicate, pixel, index, dimension).

@@ -1,0 +1,1 @@
+//! Bounding volume hierarchies over triangles and instances; closest hit, any hit, transmittance.

@@ -1,0 +1,1 @@
+//! The words that the farm, its workers and its clients share.

@@ -1,0 +1,2 @@
+//! The program `ovtigre`.
+fn main() {}

@@ -1,0 +1,1 @@
+//! Leases batches, renders them and sends back their sums.

@@ -1,0 +1,2 @@
+//! The program `ovtigre-worker`.
+fn main() {}
