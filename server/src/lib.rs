@@ -1,1 +1,7 @@
-//! Leases batches, renders them and sends back their sums.
+//! The farm: takes jobs, splits them into batches, leases them to workers, merges what comes back.
+
+pub mod api;
+pub mod blobs;
+pub mod farm;
+pub mod serve;
+pub mod store;

@@ -1,1 +1,13 @@
-//! Which samples, their sums, partial EXR, merging, error, developing.
+//! Which samples, their sums, partial EXR, merging, error, developing. Knows no scene.
+
+pub mod append;
+pub mod batch;
+pub mod compare;
+pub mod develop;
+pub mod error;
+pub mod estimate;
+pub mod exr;
+pub mod invalid;
+pub mod schedule;
+pub mod size;
+pub mod sum;

@@ -1,0 +1,41 @@
+//! Error against run time.
+
+use serde::{Deserialize, Serialize};
+
+/// One checkpoint. Errors are absent where there is a single replicate.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CurveRow {
+    /// Samples a pixel, over all replicates.
+    pub samples: u32,
+    /// Run time since the first batch was handed out.
+    pub wall_seconds: f64,
+    /// Time workers spent, summed.
+    pub worker_seconds: f64,
+    /// Rays traced.
+    pub rays: u64,
+    /// Root of the mean variance of the mean, over pixels and channels.
+    pub rms_error: Option<f64>,
+    /// Root of the mean relative variance of the mean.
+    pub relative_error: Option<f64>,
+    /// Upper end of its interval; needs three replicates.
+    pub relative_error_upper: Option<f64>,
+}
+
+/// The whole curve of a job.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Curve {
+    /// Checkpoints in order.
+    pub rows: Vec<CurveRow>,
+    /// Slope of log relative error over log worker seconds; −0.5 for plain Monte Carlo.
+    pub slope: Option<f64>,
+    /// 1 / (relative error² · worker seconds) at the last checkpoint.
+    pub efficiency: Option<f64>,
+    /// Relative error to stop at.
+    pub error_target: Option<f64>,
+    /// Run time at which the target is expected.
+    pub target_expected_at_seconds: Option<f64>,
+    /// Whether the target was reached and certified.
+    pub certified: bool,
+    /// Samples dropped, over the whole job.
+    pub invalid_samples: u64,
+}

@@ -1,0 +1,117 @@
+//! A job as a user asks for it: the command line's job flags as JSON.
+
+use crate::{
+    id::BlobId,
+    pair::{self, EnvironmentRequest},
+};
+use ovtigre_core::{
+    film::size::{Region, Size},
+    settings::Shadows,
+};
+use serde::{Deserialize, Serialize};
+
+/// Samples a pixel where a job does not say.
+pub const SAMPLES_DEFAULT: u32 = 256;
+/// Replicates where a job does not say.
+pub const REPLICATES_DEFAULT: u32 = 4;
+/// Width of a picture where a job does not say; the height follows from the camera.
+pub const WIDTH_DEFAULT: u32 = 1280;
+
+/// What is asked for; what is left out gets its default when the job is submitted.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct JobRequest {
+    /// The uploaded scene; required.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scene: Option<BlobId>,
+    /// A name for people.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// The frame in pixels.
+    #[serde(with = "pair::size", skip_serializing_if = "Option::is_none")]
+    pub size: Option<Size>,
+    /// A camera's name, or its number from 0.
+    #[serde(deserialize_with = "pair::name_or_number", skip_serializing_if = "Option::is_none")]
+    pub camera: Option<String>,
+    /// Samples a pixel at most.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub samples: Option<u32>,
+    /// Stop when the relative error is certified at or under this.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error: Option<f64>,
+    /// Stop after this many seconds of run time.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub seconds: Option<f64>,
+    /// Path expression.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub paths: Option<String>,
+    /// A path expression by its name.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub preset: Option<String>,
+    /// How light is estimated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub method: Option<MethodRequest>,
+    /// Further pictures, `NAME=EXPR` each.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub layers: Vec<String>,
+    /// Longest path in scattering events.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bounces: Option<u32>,
+    /// Radius of the lens in metres.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lens_radius: Option<f64>,
+    /// Distance in focus in metres.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub focus_distance: Option<f64>,
+    /// Light from infinitely far.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub environment: Option<EnvironmentRequest>,
+    /// Its turn around the vertical axis in degrees.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub environment_rotation: Option<f64>,
+    /// Whether direct light is blocked.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shadows: Option<Shadows>,
+    /// Chooses the random sequences.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub seed: Option<u64>,
+    /// Independently scrambled sequences; 1 gives no error bars.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub replicates: Option<u32>,
+    /// Part of the frame.
+    #[serde(with = "pair::region", skip_serializing_if = "Option::is_none")]
+    pub region: Option<Region>,
+    /// Higher goes first.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub priority: Option<i32>,
+}
+
+/// A method by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MethodRequest {
+    /// Chosen by the farm.
+    Auto,
+    /// Paths from the eye.
+    Path,
+    /// Paths from the lights.
+    Light,
+    /// Both, joined.
+    Bidirectional,
+    /// Photon map.
+    Photon,
+    /// Finite elements.
+    Radiosity,
+}
+
+/// A change to a job; what is left out stays.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct JobPatch {
+    /// Higher goes first.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub priority: Option<i32>,
+    /// `paused` or `running`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub state: Option<crate::status::JobState>,
+}

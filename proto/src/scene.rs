@@ -1,0 +1,84 @@
+//! What the farm says of an uploaded scene.
+
+use crate::id::BlobId;
+use serde::{Deserialize, Serialize};
+
+/// What is in an uploaded file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SceneReport {
+    /// The hash of its bytes.
+    pub id: BlobId,
+    /// Its size.
+    pub bytes: u64,
+    /// What kind of file, and what is in it.
+    #[serde(flatten)]
+    pub content: SceneContent,
+}
+
+/// What kind of file, and what is in it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum SceneContent {
+    /// A glTF scene.
+    Scene(SceneContents),
+    /// An image to light scenes with.
+    Environment {
+        /// Columns.
+        width: u32,
+        /// Rows.
+        height: u32,
+    },
+}
+
+/// Counts and findings of a scene.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SceneContents {
+    /// Triangles, each instance counted.
+    pub triangles: u64,
+    /// Triangles kept in memory.
+    pub triangles_stored: u64,
+    /// Triangles without area, dropped.
+    pub triangles_dropped: u64,
+    /// Meshes.
+    pub meshes: u32,
+    /// Placed meshes.
+    pub instances: u32,
+    /// Materials.
+    pub materials: u32,
+    /// Textures.
+    pub textures: u32,
+    /// Cameras, by name, in the order of their numbers.
+    pub cameras: Vec<String>,
+    /// Width over height of the first camera, where it says.
+    pub aspect_ratio: Option<f64>,
+    /// Emitters of each kind.
+    pub lights: LightCounts,
+    /// What a render of it needs.
+    pub needs: Vec<String>,
+    /// What a render of it leaves out.
+    pub leaves_out: Vec<String>,
+    /// What could not be read, or looks unintended.
+    pub warnings: Vec<SceneWarning>,
+}
+
+/// Emitters of each kind.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LightCounts {
+    /// Triangles that emit.
+    pub emissive_triangles: u64,
+    /// Point lights.
+    pub point: u32,
+    /// Spot lights.
+    pub spot: u32,
+    /// Directional lights.
+    pub directional: u32,
+}
+
+/// Something in a scene that a user should know of.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SceneWarning {
+    /// JSON pointer into the document; empty for the whole.
+    pub pointer: String,
+    /// What it is, and what was done about it.
+    pub detail: String,
+}

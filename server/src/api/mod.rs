@@ -1,0 +1,1 @@
+//! Doors: HTTP to farm and back, no rules.

@@ -1,0 +1,1 @@
+//! Scenes, partials, sums and results over an object store.

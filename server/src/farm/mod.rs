@@ -1,0 +1,1 @@
+//! Rules, no HTTP: submit, split, lease, commit, append, checkpoint, stop, reap.

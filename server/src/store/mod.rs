@@ -1,0 +1,1 @@
+//! Jobs, leases and commits, changed together or not at all.
