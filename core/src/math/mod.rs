@@ -3,5 +3,6 @@
 pub mod choice;
 pub mod colour;
 pub mod frame;
+pub mod quantile;
 pub mod robust;
 pub mod warp;
