@@ -21,10 +21,10 @@ use crate::bsdf::fresnel::fifth_power;
 use crate::bsdf::ggx::SPECULAR_BELOW;
 use glam::Vec3;
 
-const ROWS: usize = 48;
+const ROWS: usize = 64;
 const COLUMNS: usize = 64;
 /// Nodes of the means a row of the table.
-const FINER: usize = 8;
+const FINER: usize = 32;
 const MEANS: usize = (ROWS - 1) * FINER + 1;
 const LENGTH: usize = 8 * (ROWS * COLUMNS + MEANS);
 

@@ -134,11 +134,6 @@ impl Interface {
         Self { ior, walls: s.walls, tint: s.base_color, offset: s.specular * wanted - slope * f0, slope }
     }
 
-    /// Whether the reflectance is Fresnel's own.
-    pub(super) fn is_plain(&self) -> bool {
-        self.slope == Rgb::ONE && self.offset == Rgb::ZERO
-    }
-
     /// Index of the far side over that of the side of `wo`; a sheet is met from outside.
     #[inline]
     pub(super) fn eta(&self, wo: Vec3) -> f32 {

@@ -8,7 +8,8 @@ const RADIAL: usize = 36;
 const AROUND: usize = 20;
 const SAMPLES: usize = 60_000;
 
-/// Expected numbers of samples in a chart's cells, for one sample.
+/// Expected numbers of samples in a chart's cells, for one sample: the midpoint rule, with more points in and
+/// around cells where few and very few do not agree (the horizon, total internal reflection).
 fn expected(bsdf: &Bsdf, wo: Vec3, chart: &Chart) -> Vec<f64> {
     let cell = |i: usize, j: usize, n: usize| {
         let (mut sum, mut outside) = (0.0, 0);
@@ -22,19 +23,20 @@ fn expected(bsdf: &Bsdf, wo: Vec3, chart: &Chart) -> Vec<f64> {
         }
         (sum / (n * n * RADIAL * AROUND) as f64, outside)
     };
-    let cut = |i: usize, j: usize| {
-        let corner = |k: usize| ((i + k / 2) as f64 / RADIAL as f64, (j + k % 2) as f64 / AROUND as f64);
-        (0..4).any(|k| chart.direction(corner(k).0, corner(k).1).is_none())
-    };
-    let mut cells = vec![0.0; RADIAL * AROUND];
+    let (mut cells, mut cut) = (vec![0.0; RADIAL * AROUND], vec![false; RADIAL * AROUND]);
+    for (k, (value, cut)) in cells.iter_mut().zip(&mut cut).enumerate() {
+        let ((coarse, _), (fine, outside)) =
+            (cell(k / AROUND, k % AROUND, 3), cell(k / AROUND, k % AROUND, 5));
+        *value = fine;
+        *cut = (coarse - fine).abs() > 0.003 * fine + 1e-8 || (1..25).contains(&outside);
+    }
     for i in 0..RADIAL {
         for j in 0..AROUND {
-            // Cells that the horizon cuts need many points.
-            cells[i * AROUND + j] = match cell(i, j, 4) {
-                (whole, 0) if !cut(i, j) => whole,
-                (_, 16) => 0.0,
-                _ => cell(i, j, 24).0,
-            };
+            let around = [(0, 0), (0, 1), (0, AROUND - 1), (1, 0), (RADIAL - 1, 0)];
+            let near = |(di, dj)| cut[(i + di) % RADIAL * AROUND + (j + dj) % AROUND];
+            if around.into_iter().any(near) {
+                cells[i * AROUND + j] = cell(i, j, 24).0;
+            }
         }
     }
     cells

@@ -5,13 +5,13 @@ use crate::bsdf::event::{SampleKind, Transport};
 
 /// Σ f |cos| / p over a rank-1 lattice; flux, so without the factor of radiance in refraction.
 fn albedo(bsdf: &Bsdf, wo: Vec3, points: u32) -> Rgb {
-    // Fractions of powers of the plastic number's cousin in three dimensions (Roberts's R₃).
-    const STEP: [f64; 3] = [0.819_172_513_396_164_4, 0.671_043_606_703_789_2, 0.549_700_477_901_970_3];
+    // Irrational steps from the plastic number (Roberts's R₂), and equal ones.
+    const STEP: [f64; 2] = [0.754_877_666_246_693, 0.569_840_290_998_053];
     let mut sum = glam::DVec3::ZERO;
     for i in 0..points {
-        let u = STEP.map(|step| (0.5 + f64::from(i) * step).fract() as f32);
-        let u = u.map(|v| v.min(1.0_f32.next_down()));
-        let weight = match bsdf.sample(wo, u[0], Vec2::new(u[1], u[2]), Transport::Importance) {
+        let [u, v] = STEP.map(|step| ((0.5 + f64::from(i) * step).fract() as f32).min(1.0_f32.next_down()));
+        let w = (i as f32 + 0.5) / points as f32;
+        let weight = match bsdf.sample(wo, u, Vec2::new(v, w), Transport::Importance) {
             None => continue,
             Some(sample) => match sample.kind {
                 SampleKind::Smooth { value, pdf } => value.total() / pdf,
@@ -40,9 +40,11 @@ fn white_opaque_surfaces_and_sheets_lose_nothing() {
         for alpha in ALPHAS {
             let bsdf = rough(alpha, surface);
             for angle in ANGLES {
-                let found = albedo(&bsdf, tilted(angle, 2.0), 1 << 13);
-                let error = (found - Rgb::ONE).abs().max_element();
-                assert!(error < 2e-3, "{name} α {alpha} at {angle}°: {found}");
+                // Where one lobe is worth little and rarely drawn, the lattice needs more points.
+                let error_of =
+                    |points| (albedo(&bsdf, tilted(angle, 2.0), points) - Rgb::ONE).abs().max_element();
+                let error = [1 << 12, 1 << 18].into_iter().map(error_of).find(|e| *e < 1e-3);
+                assert!(error.is_some(), "{name} α {alpha} at {angle}°");
             }
         }
     }
