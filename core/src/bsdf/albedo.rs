@@ -78,12 +78,10 @@ impl Row {
     pub fn missing_and_grazing(self, w: Vec3, alpha2: f32, stretched: f32) -> (f32, f32) {
         let across = w.x * w.x + w.y * w.y;
         let x = w.z / stretched;
-        let t = if x < 0.5 {
-            (0.5 * x).sqrt()
-        } else {
-            // 1 − x without the difference.
-            1.0 - (0.5 * alpha2 * across / (stretched * (stretched + w.z))).sqrt()
-        };
+        // 1 − x without the difference. One root and two selections: a branch here is often mispredicted.
+        let rest = alpha2 * across / (stretched * (stretched + w.z));
+        let root = (0.5 * x.min(rest)).sqrt();
+        let t = if x < rest { root } else { 1.0 - root };
         let (missing, correction) = self.at(t);
         let grazing = (1.0 - missing) * fifth_power((1.0 - w.z).max(0.0)) + correction;
         (missing, grazing.clamp(0.0, 1.0 - missing))

@@ -1,9 +1,9 @@
 //! The GGX distribution of microfacet normals with Smith's height-correlated masking (Walter et al.
 //! 2007; Heitz 2014).
 //!
-//! Everything is written with the stretched length σ(w) = √(w_z² + α² (w_x² + w_y²)), which is
-//! |w_z| (1 + 2 Λ(w)): no tangent that overflows and no difference that cancels. The distribution itself
-//! takes h_x² + h_y² from the half vector, never 1 − h_z², which at α = 1e-3 would be wrong by percents.
+//! Everything is written with the stretched length σ(w) = √(cos² θ + α² sin² θ), which is
+//! |cos θ| (1 + 2 Λ(w)): no tangent that overflows and no difference that cancels. Squared sines are sums of
+//! x² + y², never 1 − z², which at α = 1e-3 would make the distribution wrong by percents.
 
 use crate::math::warp;
 use core::f32::consts::FRAC_1_PI;
@@ -52,15 +52,15 @@ impl Ggx {
         FRAC_1_PI * self.alpha2 * ratio * ratio
     }
 
-    /// G₂ / (4 |cos θ_o cos θ_i|) of the absolute cosines and stretched lengths of two directions,
-    /// G₂ = 1 / (1 + Λ_o + Λ_i).
+    /// G₂ / (4 |cos θₒ cos θᵢ|) of the absolute cosines and stretched lengths of two directions,
+    /// G₂ = 1 / (1 + Λₒ + Λᵢ).
     #[inline]
     pub fn visibility(cos_o: f32, stretched_o: f32, cos_i: f32, stretched_i: f32) -> f32 {
         0.5 / (cos_o * stretched_i + cos_i * stretched_o)
     }
 
-    /// Of two directions above the surface and their stretched lengths: D G₂ / (4 cos θ_o), which is
-    /// f · cos θ_i for reflectance 1; the density of the mirror direction over solid angle when normals
+    /// Of two directions above the surface and their stretched lengths: D G₂ / (4 cos θₒ), which is
+    /// f · cos θᵢ for reflectance 1; the density of the mirror direction over solid angle when normals
     /// are sampled with `Reach::Bounded`; and the cosine between each direction and the half vector.
     #[inline]
     pub fn reflected(self, wo: Vec3, stretched_o: f32, wi: Vec3, stretched_i: f32) -> (f32, f32, f32) {

@@ -1,8 +1,8 @@
 //! A reflecting interface: one bounce off a microfacet, and what bounces on between them.
 //!
 //! The first is GGX times Schlick's reflectance. The second makes good the energy that it loses
-//! (Kulla and Conty 2017): F_ms (1 − E(v)) (1 − E(l)) / (π (1 − Ē)) with
-//! F_ms = F̄² Ē / (1 − F̄ (1 − Ē)), reciprocal, and with the directional albedo F_ms (1 − E(v)). A white
+//! (Kulla and Conty 2017): Fₘₛ (1 − E(v)) (1 − E(l)) / (π (1 − Ē)) with
+//! Fₘₛ = F̄² Ē / (1 − F̄ (1 − Ē)), reciprocal, and with the directional albedo Fₘₛ (1 − E(v)). A white
 //! interface loses nothing. Both carry the letter `S`: the compensation is broad, but it is light that the
 //! microfacets reflect, and whoever asks for `D` means the base below them.
 
@@ -26,6 +26,8 @@ pub(super) enum Gloss {
 pub(super) struct RoughGloss {
     pub(super) ggx: Ggx,
     schlick: Schlick,
+    /// Fₘₛ.
+    multiple: Rgb,
     pub(super) between: Between,
 }
 
@@ -34,6 +36,8 @@ pub(super) struct RoughGloss {
 pub(super) struct Between {
     row: Row,
     pub(super) means: Means,
+    /// 1 / (π (1 − Ē)).
+    pub(super) scale: f32,
     alpha2: f32,
     /// ln(1 + 1/α²).
     ell: f32,
@@ -56,7 +60,10 @@ impl Gloss {
     pub(super) fn new(alpha: f32, schlick: Schlick) -> Self {
         match Ggx::new(alpha) {
             None => Self::Smooth(schlick),
-            Some(ggx) => Self::Rough(RoughGloss { ggx, schlick, between: Between::new(ggx) }),
+            Some(ggx) => {
+                let between = Between::new(ggx);
+                Self::Rough(RoughGloss { ggx, schlick, multiple: between.reflected(schlick.mean()), between })
+            }
         }
     }
 
@@ -76,10 +83,9 @@ impl Gloss {
     pub(super) fn mean_albedo(&self) -> Rgb {
         match self {
             Self::Smooth(schlick) => schlick.mean(),
-            Self::Rough(RoughGloss { schlick, between, .. }) => {
-                let means = between.means;
-                schlick.split(1.0 - means.missing, means.grazing)
-                    + between.reflected(schlick.mean()) * means.missing
+            Self::Rough(rough) => {
+                let means = rough.between.means;
+                rough.schlick.split(1.0 - means.missing, means.grazing) + rough.multiple * means.missing
             }
         }
     }
@@ -91,18 +97,18 @@ impl RoughGloss {
         let stretched = self.ggx.stretched(w);
         let (missing, grazing) = self.between.row.missing_and_grazing(w, self.ggx.alpha2, stretched);
         let single = self.schlick.split(1.0 - missing, grazing);
-        let multiple = self.between.reflected(self.schlick.mean()) * missing;
+        let multiple = self.multiple * missing;
         Seen { stretched, missing, single, multiple }
     }
 
-    /// f · cos θ_i of both lobes, and the density with which each draws `wi`: zero where the half
+    /// f · cos θᵢ of both lobes, and the density with which each draws `wi`: zero where the half
     /// vector vanishes.
     #[inline]
     pub(super) fn evaluate(&self, wo: Vec3, wi: Vec3, o: &Seen, i: &Seen) -> (Rgb, [f32; 2]) {
         let (shape, pdf, dot) = self.ggx.reflected(wo, o.stretched, wi, i.stretched);
         let single = self.schlick.split(1.0, fifth_power((1.0 - dot).max(0.0))) * shape;
-        // `o.multiple` holds F_ms (1 − E(v)) already.
-        let multiple = o.multiple * (i.missing / self.between.means.missing * wi.z * FRAC_1_PI);
+        // `o.multiple` holds Fₘₛ (1 − E(v)) already.
+        let multiple = o.multiple * (i.missing * wi.z * self.between.scale);
         (single + multiple, [pdf, self.between.pdf(wi.z)])
     }
 
@@ -123,7 +129,8 @@ impl Between {
         let alpha2 = ggx.alpha2;
         let ell = libm::log1pf(1.0 / alpha2);
         let row = Row::of(ggx.alpha);
-        Self { row, means: row.means(alpha2, ell), alpha2, ell }
+        let means = row.means(alpha2, ell);
+        Self { row, means, scale: FRAC_1_PI / means.missing, alpha2, ell }
     }
 
     /// 1 − E(w), for `w.z` > 0.
@@ -132,7 +139,7 @@ impl Between {
         self.row.missing_and_grazing(w, self.alpha2, stretched).0
     }
 
-    /// F_ms of a mean reflectance.
+    /// Fₘₛ of a mean reflectance.
     #[inline]
     fn reflected(&self, mean: Rgb) -> Rgb {
         let even = 1.0 - self.means.missing;

@@ -25,7 +25,7 @@ impl Lambert {
         Evaluated { value, pdf: cos * FRAC_1_PI }
     }
 
-    pub(super) fn draw(&self, wo: Vec3, u: Vec2) -> Drawn {
+    pub(super) fn draw(wo: Vec3, u: Vec2) -> Drawn {
         let wi = warp::cosine_hemisphere(u);
         Drawn::smooth(wi.with_z(wi.z.copysign(wo.z)))
     }

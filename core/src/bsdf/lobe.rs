@@ -7,7 +7,7 @@ use glam::Vec3;
 /// Values and densities of all smooth lobes of a pair of directions.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Evaluated {
-    /// f · |cos θ_i|.
+    /// f · |cos θᵢ|.
     pub(super) value: Scattered,
     /// Density over solid angle, with the probabilities of the lobes.
     pub(super) pdf: f32,
@@ -26,7 +26,7 @@ pub(super) struct Drawn {
 /// The choice of an ideally specular lobe.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Delta {
-    /// f · |cos θ_i|, the coefficient of the Dirac delta.
+    /// f · |cos θᵢ|, the coefficient of the Dirac delta.
     pub(super) value: Rgb,
     pub(super) probability: f32,
 }

@@ -103,7 +103,7 @@ impl Bsdf {
         letters.has(Letter::Diffuse) || letters.has(Letter::Glossy)
     }
 
-    /// f · |cos θ_i| by letter, of the smooth lobes; zero where a direction lies in the surface.
+    /// f · |cos θᵢ| by letter, of the smooth lobes; zero where a direction lies in the surface.
     #[inline]
     pub fn eval(&self, wo: Vec3, wi: Vec3, transport: Transport) -> Scattered {
         self.evaluate(wo, wi, transport).value
@@ -129,7 +129,7 @@ impl Bsdf {
             return None;
         }
         let Drawn { wi, eta, delta } = match self {
-            Self::Lambert(part) => part.draw(wo, u),
+            Self::Lambert(_) => Lambert::draw(wo, u),
             Self::Conductor(part) => part.draw(wo, u_lobe, u)?,
             Self::Plastic(part) => part.draw(wo, u_lobe, u)?,
             Self::Glass(part) => part.draw(wo, u_lobe, u, transport)?,
@@ -163,6 +163,7 @@ impl Bsdf {
 }
 
 /// Every number within its range; not-a-number becomes zero.
+#[expect(clippy::manual_clamp, reason = "clamp keeps what is not a number")]
 fn clamped(s: &SurfaceParameters) -> SurfaceParameters {
     let unit = |v: f32| v.max(0.0).min(1.0);
     SurfaceParameters {

@@ -1,8 +1,8 @@
 //! A dielectric interface over an opaque diffuse base.
 //!
 //! What the interface does not reflect reaches the base and leaves again in proportion to what the
-//! interface lets out: ρ (1 − E_s(v)) (1 − E_s(l)) / (π (1 − Ē_s)), E_s the directional albedo of the interface by
-//! channel (Kelemen and Szirmay-Kalos 2001). Reciprocal, and the albedo E_s(v) + ρ (1 − E_s(v)) is at most 1 in
+//! interface lets out: ρ (1 − Eₛ(v)) (1 − Eₛ(l)) / (π (1 − Ēₛ)), Eₛ the directional albedo of the interface by
+//! channel (Kelemen and Szirmay-Kalos 2001). Reciprocal, and the albedo Eₛ(v) + ρ (1 − Eₛ(v)) is at most 1 in
 //! every direction; the mix in appendix B of the glTF specification exceeds 1 by far at grazing angles.
 
 use crate::bsdf::conductor::upward;
@@ -21,7 +21,7 @@ use glam::{Vec2, Vec3};
 pub struct Plastic {
     gloss: Gloss,
     base: Rgb,
-    /// ρ / (π (1 − Ē_s)).
+    /// ρ / (π (1 − Ēₛ)).
     coupled: Rgb,
 }
 

@@ -11,7 +11,6 @@ use crate::bsdf::glass::{Facet, Interface};
 use crate::bsdf::gloss::Between;
 use crate::bsdf::lobe::{Drawn, Evaluated, split};
 use crate::math::colour::Rgb;
-use core::f32::consts::FRAC_1_PI;
 use glam::{Vec2, Vec3};
 
 /// The rough sheet's own part of `Glass`.
@@ -38,7 +37,7 @@ impl Sheet {
             (self.between.missing(wo, stretched_o), self.between.missing(wi, stretched_i));
         let (single, chance) = of_side(&interface.facet(dot, interface.ior), same_side);
         let (multiple, chance_multiple) = of_side(&self.mean, same_side);
-        let rest = missing_o * missing_i / self.between.means.missing * wi.z * FRAC_1_PI;
+        let rest = missing_o * missing_i * self.between.scale * wi.z;
         let value = Scattered { diffuse: Rgb::ZERO, glossy: single * shape + multiple * rest };
         let pdf_multiple = chance_multiple * self.between.pdf(wi.z);
         Evaluated { value, pdf: (1.0 - missing_o) * chance * pdf + missing_o * pdf_multiple }

@@ -20,7 +20,7 @@ impl Solid {
     }
 
     pub(super) fn evaluate(
-        &self,
+        self,
         interface: &Interface,
         wo: Vec3,
         wi: Vec3,
@@ -37,7 +37,7 @@ impl Solid {
         }
     }
 
-    fn reflected(&self, interface: &Interface, wo: Vec3, wi: Vec3, eta: f32) -> Evaluated {
+    fn reflected(self, interface: &Interface, wo: Vec3, wi: Vec3, eta: f32) -> Evaluated {
         let half = wo + wi;
         let length2 = half.length_squared();
         if length2 < f32::MIN_POSITIVE {
@@ -53,7 +53,7 @@ impl Solid {
     }
 
     fn refracted(
-        &self,
+        self,
         interface: &Interface,
         wo: Vec3,
         wi: Vec3,
@@ -82,7 +82,7 @@ impl Solid {
         Evaluated { value: Scattered { diffuse: Rgb::ZERO, glossy }, pdf }
     }
 
-    pub(super) fn draw(&self, interface: &Interface, wo: Vec3, u_lobe: f32, u: Vec2) -> Option<Drawn> {
+    pub(super) fn draw(self, interface: &Interface, wo: Vec3, u_lobe: f32, u: Vec2) -> Option<Drawn> {
         let eta = interface.eta(wo);
         let side = wo.z.signum();
         let above = wo.with_z(wo.z.abs());

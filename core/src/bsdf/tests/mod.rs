@@ -1,5 +1,7 @@
 //! Whole surfaces: densities, energy, reciprocity.
 
+#![expect(clippy::float_cmp, reason = "a sample must carry the very bits of eval and pdf")]
+
 mod chart;
 mod chi_square;
 mod energy;
