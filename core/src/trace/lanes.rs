@@ -24,6 +24,7 @@ pub(super) trait Lanes: Copy {
     fn mul_sub(self, factor: Self, term: Self) -> Self;
     /// `term − self · factor`, rounded once.
     fn neg_mul_add(self, factor: Self, term: Self) -> Self;
+    fn abs(self) -> Self;
     /// The lesser; `other` where one is NaN or both are zero.
     fn min(self, other: Self) -> Self;
     /// The greater; `other` where one is NaN or both are zero.
@@ -94,6 +95,9 @@ pub(super) mod portable {
         fn neg_mul_add(self, factor: Self, term: Self) -> Self {
             Self(from_fn(|i| (-self.0[i]).mul_add(factor.0[i], term.0[i])))
         }
+        fn abs(self) -> Self {
+            Self(self.0.map(f32::abs))
+        }
         fn min(self, other: Self) -> Self {
             self.zip(other, |a, b| if a < b { a } else { b })
         }
@@ -114,7 +118,7 @@ pub(super) mod portable {
 mod avx2 {
     use super::{Lanes, Row, WIDTH};
     use std::arch::x86_64::{
-        __m256, _CMP_LE_OQ, _CMP_LT_OQ, _mm256_add_ps, _mm256_cmp_ps, _mm256_div_ps, _mm256_fmadd_ps,
+        __m256, _CMP_LE_OQ, _CMP_LT_OQ, _mm256_add_ps, _mm256_andnot_ps, _mm256_cmp_ps, _mm256_div_ps, _mm256_fmadd_ps,
         _mm256_fmsub_ps, _mm256_fnmadd_ps, _mm256_load_ps, _mm256_max_ps, _mm256_min_ps, _mm256_movemask_ps,
         _mm256_mul_ps, _mm256_set1_ps, _mm256_store_ps, _mm256_sub_ps,
     };
@@ -165,6 +169,10 @@ mod avx2 {
             Self(instruction!(_mm256_div_ps(self.0, other.0)))
         }
         #[inline(always)]
+        fn abs(self) -> Self {
+            Self(instruction!(_mm256_andnot_ps(_mm256_set1_ps(-0.0), self.0)))
+        }
+        #[inline(always)]
         fn min(self, other: Self) -> Self {
             Self(instruction!(_mm256_min_ps(self.0, other.0)))
         }
@@ -211,7 +219,7 @@ mod tests {
     fn results<L: Lanes>(a: f32, b: f32, c: f32) -> Vec<[u32; WIDTH]> {
         let (a, b, c) = (L::splat(a), L::load(&Row([b; WIDTH])), L::splat(c));
         let mut all = vec![bits(a.add(b)), bits(a.sub(b)), bits(a.mul(b)), bits(a.div(b)), bits(a.min(b))];
-        all.extend([bits(a.max(b)), bits(a.mul_add(b, c)), bits(a.mul_sub(b, c)), bits(a.neg_mul_add(b, c))]);
+        all.extend([bits(a.max(b)), bits(a.mul_add(b, c)), bits(a.mul_sub(b, c)), bits(a.neg_mul_add(b, c)), bits(a.abs())]);
         all.push([a.at_most(b); WIDTH]);
         all.push([a.below(b); WIDTH]);
         all

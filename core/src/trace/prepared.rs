@@ -14,6 +14,8 @@ const LEAST_SLOPE: f32 = 1.0 / (1u64 << 63) as f32;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Prepared {
     pub(super) origin: [f32; 3],
+    /// Scaled: the largest component is in 1..2.
+    pub(super) direction: [f32; 3],
     /// 1 / direction, finite.
     pub(super) inverse: [f32; 3],
     /// origin / direction.
@@ -53,6 +55,7 @@ impl Prepared {
         let o = origin.to_array();
         Some(Self {
             origin: o,
+            direction: d,
             inverse,
             offset: [o[0] * inverse[0], o[1] * inverse[1], o[2] * inverse[2]],
             nearer: d.map(|c| usize::from(c.is_sign_negative())),

@@ -2,7 +2,8 @@
 
 use super::lanes::{Lanes, Row, WIDTH};
 use super::prepared::Prepared;
-use glam::Vec3;
+use crate::math::robust::UNIT_ROUNDOFF;
+use glam::{DVec3, Vec3};
 
 /// Up to eight triangles; lanes without one hold NaN, which no comparison lets through.
 #[derive(Clone, Debug)]
@@ -83,14 +84,46 @@ impl Block {
         }
         let reciprocal = L::splat(1.0).div(u.add(v).add(w));
         let (first, second, third) = (u.mul(reciprocal), v.mul(reciprocal), w.mul(reciprocal));
-        let t = third.mul_add(cz, second.mul_add(bz, first.mul(az))).mul(sz);
+        let mut t = third.mul_add(cz, second.mul_add(bz, first.mul(az))).mul(sz);
+        let reach = |a: L, b: L, c: L| a.abs().max(b.abs()).max(c.abs());
+        let volume = reach(ax, bx, cx).mul(reach(ay, by, cy)).mul(reach(az, bz, cz));
+        let unsure = mask & t.abs().at_most(volume.mul(reciprocal.abs()).mul(L::splat(UNSURE)));
+        if unsure != 0 {
+            t = L::load(&self.settle_distances(unsure, ray, t.store()));
+        }
         mask &= zero.below(t) & t.at_most(L::splat(limit));
         if mask == 0 {
             return None;
         }
         Some(Found { mask, t: t.store(), second: second.store(), third: third.store() })
     }
+
+    /// Computes `t` of the lanes in `mask` again in f64, from the triangle's plane.
+    #[cold]
+    fn settle_distances(&self, mask: u32, ray: &Prepared, mut t: Row) -> Row {
+        let origin = DVec3::from_array(ray.origin.map(f64::from));
+        for lane in (0..WIDTH).filter(|lane| mask & (1 << lane) != 0) {
+            let vertex = |v: usize| {
+                DVec3::from_array([0, 1, 2].map(|axis: usize| f64::from(self.vertices[v][axis].0[lane])))
+            };
+            let normal = (vertex(1) - vertex(0)).cross(vertex(2) - vertex(0));
+            let nearest = [vertex(0), vertex(1), vertex(2)]
+                .map(|v| v - origin)
+                .into_iter()
+                .reduce(|a, b| if b.length_squared() < a.length_squared() { b } else { a })
+                .expect("three vertices");
+            let distance = normal.dot(nearest) / normal.dot(ray.direction.map(f64::from).into());
+            t.0[lane] = distance as f32;
+        }
+        t
+    }
 }
+
+/// Bound on the error of `t`, in products of the largest sheared coordinates over the sum of the edge functions: each
+/// sheared coordinate is within 3 rounding errors of the largest, so an edge function is within 8 of the largest product,
+/// and three of these times a depth make 24. A ray that leaves the surface is that close to it; a sliver's `t`
+/// may be no better.
+const UNSURE: f32 = 24.0 * UNIT_ROUNDOFF;
 
 /// Computes the edge functions of the lanes in `mask` again in f64, where products of two floats are exact and so are
 /// the signs. Returns the lanes that turn out to be missed.
