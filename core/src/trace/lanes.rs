@@ -42,10 +42,7 @@ pub(super) type Native = avx2::Avx2;
 #[cfg(not(all(target_arch = "x86_64", target_feature = "avx2", target_feature = "fma")))]
 pub(super) type Native = portable::Portable;
 
-#[cfg_attr(
-    all(target_arch = "x86_64", target_feature = "avx2", target_feature = "fma", not(test)),
-    expect(dead_code, reason = "this build has AVX2; its tests compare it with these loops")
-)]
+#[cfg(any(test, not(all(target_arch = "x86_64", target_feature = "avx2", target_feature = "fma"))))]
 pub(super) mod portable {
     use super::{Lanes, Row, WIDTH};
     use std::array::from_fn;
