@@ -7,9 +7,6 @@
 pub mod albedo;
 pub mod conductor;
 pub mod event;
-<<<<<<< HEAD
-pub mod surface;
-=======
 pub mod fresnel;
 pub mod ggx;
 pub mod glass;
@@ -180,4 +177,3 @@ fn clamped(s: &SurfaceParameters) -> SurfaceParameters {
         walls: s.walls,
     }
 }
->>>>>>> bsdf

@@ -85,12 +85,14 @@ fn mix<T: Copy + std::ops::Mul<f32, Output = T> + std::ops::Add<Output = T>>(v: 
     v[0] * w.x + v[1] * w.y + v[2] * w.z
 }
 
-/// Point and error bound: γ₇ Σ|bᵢvᵢ| for the combination; a transform adds its own rounding and carries
-/// the error through (pbrt §6.8).
+/// Point and error bound: γ₇ Σ|bᵢvᵢ| for the combination, a transform adds its own rounding and carries the
+/// error through (pbrt §6.8). The largest axis counts for all: a triangle in the plane y = 0 has no error in y,
+/// but the distance along a ray is computed from all three, and with the axes apart 2 % of the light between a
+/// floor at 0 and a lamp near it was lost to hits on the floor itself.
 fn place(placement: &Placement, corners: [Vec3; 3], weights: Vec3) -> (Vec3, Vec3) {
     let position = mix(corners, weights);
     let magnitude = mix(corners.map(Vec3::abs), weights.abs());
-    let error = magnitude * gamma(7.0);
+    let error = Vec3::splat(magnitude.max_element() * gamma(7.0));
     match placement {
         Placement::World => (position, error),
         Placement::Moved(moved) => {
