@@ -40,6 +40,7 @@ const BYTES: &[u8; LENGTH] = include_bytes!("solid_albedo.bin");
 /// By side, plane, row and column; then the means by side, plane and finer row.
 static TABLE: [f32; LENGTH / 4] = decode();
 
+#[expect(clippy::large_stack_arrays, reason = "evaluated by the compiler")]
 const fn decode() -> [f32; LENGTH / 4] {
     let mut out = [0.0; LENGTH / 4];
     let mut i = 0;
