@@ -64,7 +64,8 @@ pub(crate) fn assemble(
             gather(&mut gathered, &route, name, ids, dropped);
             if gathered.triangles.len() == before {
                 dropped.instances += 1;
-                problems.add(&node.at.pointer, "its transform leaves nothing of its mesh that light could meet");
+                problems
+                    .add(&node.at.pointer, "its transform leaves nothing of its mesh that light could meet");
             }
         }
         if moved.is_empty() {
@@ -73,6 +74,12 @@ pub(crate) fn assemble(
         let mut mesh = Mesh::default();
         let route = Route { shape: &shape, world: DAffine3::IDENTITY, normalisation: local };
         gather(&mut mesh, &route, &shape.name, ids, dropped);
+        if mesh.triangles.is_empty() {
+            dropped.instances += moved.len() as u64;
+            let pointer = format!("/meshes/{}", shape.mesh);
+            problems.add(pointer, "all its triangles vanish in single precision: it is left out");
+            continue;
+        }
         let id = MeshId(meshes.len() as u32);
         meshes.push(mesh);
         instances.extend(moved.into_iter().map(|(place, placement)| Instance {
@@ -138,7 +145,8 @@ fn scene_bounds(meshes: &[Mesh], instances: &[Instance]) -> Bounds {
     for instance in instances {
         let to_world = instance.placement.to_world();
         let matrix = glam::Mat3::from(to_world.matrix3).as_dmat3();
-        let transform = DAffine3 { matrix3: matrix, translation: Vec3::from(to_world.translation).as_dvec3() };
+        let transform =
+            DAffine3 { matrix3: matrix, translation: Vec3::from(to_world.translation).as_dvec3() };
         all = all.union(of[instance.mesh.index()].transformed(&transform));
     }
     all
@@ -179,13 +187,15 @@ fn append_vertices(mesh: &mut Mesh, route: &Route<'_>, geometry: &Geometry, hand
     let after = before + geometry.positions.len();
     let rigid = geometry.influences.is_none();
     let normals = normal_matrix(&route.world.matrix3);
-    let transform = |v: usize| if rigid { route.world } else { route.shape.transform(geometry, v, &route.world) };
+    let transform =
+        |v: usize| if rigid { route.world } else { route.shape.transform(geometry, v, &route.world) };
     if let Some(influences) = &geometry.influences {
         *handedness = Handedness::of(&influences.transform(0, &route.shape.joints).matrix3);
     }
-    mesh.positions.extend((geometry.positions.iter().enumerate()).map(|(v, p)| {
-        route.normalisation.point(transform(v).transform_point3(p.as_dvec3()))
-    }));
+    mesh.positions.extend(
+        (geometry.positions.iter().enumerate())
+            .map(|(v, p)| route.normalisation.point(transform(v).transform_point3(p.as_dvec3()))),
+    );
     let normal = |(v, n): (usize, &Vec3)| {
         let matrix = if rigid { normals } else { normal_matrix(&transform(v).matrix3) };
         (matrix * n.as_dvec3()).normalize_or_zero().as_vec3()

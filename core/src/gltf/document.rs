@@ -103,7 +103,11 @@ pub(crate) fn whole(value: &Value) -> Option<u64> {
 impl<'a> At<'a> {
     /// An error here.
     pub(crate) fn error(&self, detail: impl Into<String>) -> LoadError {
-        LoadError::Document { file: self.file.to_owned(), pointer: self.pointer.clone(), detail: detail.into() }
+        LoadError::Document {
+            file: self.file.to_owned(),
+            pointer: self.pointer.clone(),
+            detail: detail.into(),
+        }
     }
 
     /// The error of a value that is not `wanted`.
@@ -221,7 +225,9 @@ impl<'a> At<'a> {
         }
         let mut numbers = [0.0; N];
         for (number, value) in numbers.iter_mut().zip(list) {
-            *number = value.as_f64().ok_or_else(|| at.error(format!("holds {} instead of a number", kind(value))))?;
+            *number = value
+                .as_f64()
+                .ok_or_else(|| at.error(format!("holds {} instead of a number", kind(value))))?;
         }
         Ok(Some(numbers))
     }

@@ -46,7 +46,7 @@ pub fn load(bundle: &Bundle, limits: &Limits) -> Result<Loaded, LoadError> {
     let mut shapes = shapes::find(source, &tree)?;
     let read = shapes::read(source, &mut shapes, &mut table, &mut dropped, &mut problems)?;
     let (meshes, instances) = count_uses(&shapes);
-    let pictures = pictures::read(bundle, source, &table.images())?;
+    let pictures = pictures::read(bundle, source, &table.images(), &mut problems)?;
     survey::survey(bundle, source, &table.images(), &mut problems);
     let textures = table.finish(&pictures);
     let (materials, ids) = number_materials(&document, read, &shapes, &textures)?;
@@ -73,7 +73,8 @@ pub fn load(bundle: &Bundle, limits: &Limits) -> Result<Loaded, LoadError> {
 
 fn check_version(document: &Document) -> Result<(), LoadError> {
     let root = document.root();
-    let asset = root.object("asset")?.ok_or_else(|| root.error("\"asset\" is missing: this is no glTF 2.0"))?;
+    let asset =
+        root.object("asset")?.ok_or_else(|| root.error("\"asset\" is missing: this is no glTF 2.0"))?;
     for key in ["minVersion", "version"] {
         let Some(text) = asset.text(key)? else {
             continue;
@@ -83,7 +84,8 @@ fn check_version(document: &Document) -> Result<(), LoadError> {
             ("version", Some(Ok(2)), Some(Ok(_)), None) | ("minVersion", Some(Ok(2)), Some(Ok(0)), None) => {}
             ("minVersion", Some(Ok(0 | 1)), Some(Ok(_)), None) => {}
             (_, Some(Ok(major)), Some(Ok(minor)), None) => {
-                return Err(asset.error(format!("glTF {major}.{minor} is not supported; convert the scene to glTF 2.0")));
+                return Err(asset
+                    .error(format!("glTF {major}.{minor} is not supported; convert the scene to glTF 2.0")));
             }
             _ => return Err(asset.error(format!("\"{key}\" is not a version such as 2.0"))),
         }
@@ -146,7 +148,8 @@ fn point_out_what_is_missing(scene: &SceneData, report: &Report, problems: &mut 
         problems.add("", "there is no camera: the scene is framed");
     }
     if report.emissive_triangles == 0 && scene.punctual.is_empty() {
-        problems.add("", "there is no light: the scene is lit by a default sky unless an environment is given");
+        problems
+            .add("", "there is no light: the scene is lit by a default sky unless an environment is given");
     }
     let degenerate = report.dropped.degenerate_triangles;
     if degenerate > 0 {

@@ -42,7 +42,8 @@ impl SceneData {
     /// Corners of a triangle of an instance, in the scene's space, counter-clockwise seen from the front.
     pub fn corners(&self, instance: u32, triangle: u32) -> [Vec3; 3] {
         let instance = &self.instances[instance as usize];
-        let [a, b, c] = self.meshes[instance.mesh.index()].corners(triangle).map(|p| instance.placement.point(p));
+        let [a, b, c] =
+            self.meshes[instance.mesh.index()].corners(triangle).map(|p| instance.placement.point(p));
         match instance.placement.handedness() {
             Handedness::Kept => [a, b, c],
             Handedness::Mirrored => [a, c, b],
@@ -112,7 +113,8 @@ fn geometric_normal(placement: &Placement, corners: [Vec3; 3]) -> Vec3 {
 
 fn coordinates(mesh: &Mesh, triangle: u32, weights: Vec3) -> SurfaceCoordinates {
     let corners = mesh.triangles[triangle as usize].map(|v| v as usize);
-    let uv = |list: &Vec<Vec2>| if list.is_empty() { Vec2::ZERO } else { mix(corners.map(|v| list[v]), weights) };
+    let uv =
+        |list: &Vec<Vec2>| if list.is_empty() { Vec2::ZERO } else { mix(corners.map(|v| list[v]), weights) };
     let colour =
         if mesh.colours.is_empty() { Vec4::ONE } else { mix(corners.map(|v| mesh.colours[v]), weights) };
     SurfaceCoordinates { uvs: [uv(&mesh.uvs[0]), uv(&mesh.uvs[1])], colour }
