@@ -14,6 +14,9 @@ use crate::scene::normalisation::Normalisation;
 use glam::{DAffine3, DVec3, Vec3, Vec4};
 use std::collections::BTreeMap;
 
+/// The scene's materials by their index in the document; `None` is the default one.
+pub(crate) type MaterialIds = BTreeMap<Option<usize>, MaterialId>;
+
 /// Meshes and instances of a scene.
 pub(crate) struct Assembled {
     pub(crate) meshes: Vec<Mesh>,
@@ -36,7 +39,7 @@ pub(crate) fn assemble(
     document: &Document,
     tree: &Tree<'_>,
     mut shapes: Vec<Shape>,
-    ids: &BTreeMap<Option<usize>, MaterialId>,
+    ids: &MaterialIds,
     dropped: &mut Dropped,
     problems: &mut Problems,
 ) -> Result<Assembled, LoadError> {
@@ -97,7 +100,9 @@ pub(crate) fn assemble(
 fn place_gathered(gathered: Mesh, meshes: &mut Vec<Mesh>, instances: &mut Vec<Instance>) {
     if gathered.triangles.is_empty() {
         meshes.remove(0);
-        instances.iter_mut().for_each(|instance| instance.mesh.0 -= 1);
+        for instance in instances.iter_mut() {
+            instance.mesh.0 -= 1;
+        }
     } else {
         meshes[0] = gathered;
         instances.insert(0, Instance { mesh: MeshId(0), name: String::new(), placement: Placement::World });
@@ -153,13 +158,7 @@ fn scene_bounds(meshes: &[Mesh], instances: &[Instance]) -> Bounds {
 }
 
 /// Appends a shape to a mesh.
-fn gather(
-    mesh: &mut Mesh,
-    route: &Route<'_>,
-    name: &str,
-    ids: &BTreeMap<Option<usize>, MaterialId>,
-    dropped: &mut Dropped,
-) {
+fn gather(mesh: &mut Mesh, route: &Route<'_>, name: &str, ids: &MaterialIds, dropped: &mut Dropped) {
     let first = mesh.triangles.len() as u32;
     for geometry in &route.shape.geometries {
         let base = mesh.positions.len() as u32;

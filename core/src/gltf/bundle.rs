@@ -5,7 +5,7 @@ use crate::gltf::error::LoadError;
 use crate::gltf::limits::Limits;
 use crate::gltf::{glb, uri};
 use std::borrow::Cow;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::{Cursor, Read, Write};
 use std::ops::Range;
 use std::sync::Arc;
@@ -264,7 +264,7 @@ pub fn references(scene: &[u8]) -> Result<Vec<String>, LoadError> {
     let bundle = Bundle::open(scene)?;
     let parts = bundle.parts()?;
     let document = Document::parse(bundle.name(), &parts.json, &Limits::default())?;
-    let mut files = BTreeMap::new();
+    let mut files = BTreeSet::new();
     for list in ["buffers", "images"] {
         for item in document.list(list)? {
             let Some(text) = item.text("uri")?.filter(|text| !text.starts_with("data:")) else {
@@ -276,8 +276,8 @@ pub fn references(scene: &[u8]) -> Result<Vec<String>, LoadError> {
                 uri: uri::shorten(text),
                 detail,
             })?;
-            files.insert(file, ());
+            files.insert(file);
         }
     }
-    Ok(files.into_keys().collect())
+    Ok(files.into_iter().collect())
 }

@@ -51,7 +51,7 @@ pub(crate) fn check(document: &Document, problems: &mut Problems) -> Result<(), 
             Some(Support::Full) => {}
             Some(Support::Partly(left_out)) => problems.add(&at.pointer, format!("{name}: {left_out}")),
             None => {
-                problems.add(&at.pointer, format!("the extension {name} is not supported and is left out"))
+                problems.add(&at.pointer, format!("the extension {name} is not supported and is left out"));
             }
         }
     }

@@ -214,6 +214,13 @@ fn renumber(triangles: &mut [[u32; 3]], vertices: usize) -> Vec<u32> {
     used
 }
 
+fn not_finite(attributes: &At<'_>, name: &str, vertex: u32) -> LoadError {
+    match attributes.need(name) {
+        Ok(at) => at.error(format!("vertex {vertex} is not a finite number")),
+        Err(error) => error,
+    }
+}
+
 impl<'a> Primitive<'a> {
     /// An attribute of the shape wanted, as many elements as positions.
     fn attribute(
@@ -235,13 +242,6 @@ impl<'a> Primitive<'a> {
         Ok(Some(accessor))
     }
 
-    fn not_finite(&self, attributes: &At<'_>, name: &str, vertex: u32) -> LoadError {
-        match attributes.need(name) {
-            Ok(at) => at.error(format!("vertex {vertex} is not a finite number")),
-            Err(error) => error,
-        }
-    }
-
     /// Finite vectors of the used vertices.
     fn vectors<const N: usize>(
         &self,
@@ -255,7 +255,7 @@ impl<'a> Primitive<'a> {
                 if numbers.iter().all(|x| x.is_finite()) {
                     Ok(numbers)
                 } else {
-                    Err(self.not_finite(attributes, name, v))
+                    Err(not_finite(attributes, name, v))
                 }
             })
             .collect()
@@ -343,7 +343,9 @@ impl<'a> Primitive<'a> {
             .map(|c| Vec4::from(c).max(Vec4::ZERO))
             .collect();
         if accessor.components == 3 {
-            colours.iter_mut().for_each(|c| c.w = 1.0);
+            for colour in &mut colours {
+                colour.w = 1.0;
+            }
         }
         if colours.iter().all(|c| *c == Vec4::ONE) {
             colours.clear();
@@ -369,6 +371,18 @@ impl<'a> Primitive<'a> {
     }
 }
 
+fn keep<T: Copy>(list: &mut Vec<T>, used: &[u32]) {
+    if !list.is_empty() {
+        *list = used.iter().map(|&v| list[v as usize]).collect();
+    }
+}
+
+fn again<T: Copy>(list: &mut Vec<T>, vertex: usize) {
+    if let Some(&value) = list.get(vertex) {
+        list.push(value);
+    }
+}
+
 impl Geometry {
     /// Leaves out triangles without area. Differences of floats and their products are nearly exact in double
     /// precision, so what remains has a normal.
@@ -386,11 +400,6 @@ impl Geometry {
         if used.len() == vertices {
             return;
         }
-        fn keep<T: Copy>(list: &mut Vec<T>, used: &[u32]) {
-            if !list.is_empty() {
-                *list = used.iter().map(|&v| list[v as usize]).collect();
-            }
-        }
         keep(&mut self.positions, &used);
         keep(&mut self.normals, &used);
         keep(&mut self.tangents, &used);
@@ -404,11 +413,6 @@ impl Geometry {
 
     /// A copy of a vertex, by its number.
     pub(crate) fn duplicate(&mut self, vertex: usize) -> u32 {
-        fn again<T: Copy>(list: &mut Vec<T>, vertex: usize) {
-            if let Some(&value) = list.get(vertex) {
-                list.push(value);
-            }
-        }
         let new = self.positions.len() as u32;
         again(&mut self.positions, vertex);
         again(&mut self.normals, vertex);

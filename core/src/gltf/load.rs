@@ -1,7 +1,7 @@
 //! A bundle to a scene.
 
 use crate::gltf::accessor::Source;
-use crate::gltf::assemble::{Assembled, assemble};
+use crate::gltf::assemble::{Assembled, MaterialIds, assemble};
 use crate::gltf::buffers::Buffers;
 use crate::gltf::bundle::Bundle;
 use crate::gltf::document::Document;
@@ -81,8 +81,9 @@ fn check_version(document: &Document) -> Result<(), LoadError> {
         };
         let mut numbers = text.split('.').map(str::parse::<u32>);
         match (key, numbers.next(), numbers.next(), numbers.next()) {
-            ("version", Some(Ok(2)), Some(Ok(_)), None) | ("minVersion", Some(Ok(2)), Some(Ok(0)), None) => {}
-            ("minVersion", Some(Ok(0 | 1)), Some(Ok(_)), None) => {}
+            ("version", Some(Ok(2)), Some(Ok(_)), None)
+            | ("minVersion", Some(Ok(2)), Some(Ok(0)), None)
+            | ("minVersion", Some(Ok(0 | 1)), Some(Ok(_)), None) => {}
             (_, Some(Ok(major)), Some(Ok(minor)), None) => {
                 return Err(asset
                     .error(format!("glTF {major}.{minor} is not supported; convert the scene to glTF 2.0")));
@@ -111,7 +112,7 @@ fn number_materials(
     read: Materials,
     shapes: &[Shape],
     textures: &[Texture],
-) -> Result<(Vec<Material>, BTreeMap<Option<usize>, MaterialId>), LoadError> {
+) -> Result<(Vec<Material>, MaterialIds), LoadError> {
     let mut least_alpha: BTreeMap<Option<usize>, f32> = BTreeMap::new();
     for geometry in shapes.iter().flat_map(|shape| &shape.geometries).filter(|g| !g.triangles.is_empty()) {
         let least = least_alpha.entry(geometry.material).or_insert(1.0);

@@ -78,20 +78,17 @@ fn inspect<'a>(
 ) -> Result<Encoded<'a>, LoadError> {
     let mut declared = item.text("mimeType")?;
     let mut file = bundle.name().to_owned();
-    let bytes = match item.text("uri")? {
-        Some(text) => {
-            match text.strip_prefix("data:") {
-                Some(data) => declared = declared.or(data.split([';', ',']).next()),
-                None => file = uri::shorten(text),
-            }
-            read_uri(bundle, item, text)?
+    let bytes = if let Some(text) = item.text("uri")? {
+        match text.strip_prefix("data:") {
+            Some(data) => declared = declared.or(data.split([';', ',']).next()),
+            None => file = uri::shorten(text),
         }
-        None => {
-            let views = source.document.count("bufferViews");
-            let view = item.index("bufferView", "bufferViews", views)?;
-            let view = view.ok_or_else(|| item.error("has neither a \"uri\" nor a \"bufferView\""))?;
-            Cow::Borrowed(source.buffers.view(source.document, view)?.bytes)
-        }
+        read_uri(bundle, item, text)?
+    } else {
+        let views = source.document.count("bufferViews");
+        let view = item.index("bufferView", "bufferViews", views)?;
+        let view = view.ok_or_else(|| item.error("has neither a \"uri\" nor a \"bufferView\""))?;
+        Cow::Borrowed(source.buffers.view(source.document, view)?.bytes)
     };
     let pointer = item.pointer.clone();
     let refuse = |detail: String| LoadError::Picture { file: file.clone(), pointer: pointer.clone(), detail };

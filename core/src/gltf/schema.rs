@@ -100,7 +100,7 @@ impl<'a> Walk<'a, '_> {
             match members.get(field.name) {
                 Some(value) => self.within(Step::Key(field.name), |walk| walk.value(value, &field.kind)),
                 None if field.presence == Presence::Needed => {
-                    self.report(format!("\"{}\" is missing", field.name))
+                    self.report(format!("\"{}\" is missing", field.name));
                 }
                 None => {}
             }
@@ -127,13 +127,12 @@ impl<'a> Walk<'a, '_> {
 
     fn value(&mut self, value: &'a Value, kind: &'static Kind) {
         match kind {
-            Kind::Any => {}
             Kind::Text if !value.is_string() => self.mismatch("a string", value),
             Kind::Flag if !value.is_boolean() => self.mismatch("true or false", value),
-            Kind::Text | Kind::Flag => {}
+            Kind::Any | Kind::Text | Kind::Flag => {}
             Kind::Whole(least) => match whole(value) {
                 Some(number) if number < *least => {
-                    self.report(format!("is {number}, but must be at least {least}"))
+                    self.report(format!("is {number}, but must be at least {least}"));
                 }
                 Some(_) => {}
                 None => self.mismatch("a whole number that is not negative", value),
@@ -141,7 +140,7 @@ impl<'a> Walk<'a, '_> {
             Kind::Number(least, most) => self.number(value, *least, *most),
             Kind::Above(limit, most) => match value.as_f64() {
                 Some(number) if number <= *limit => {
-                    self.report(format!("is {number}, but must be above {limit}"))
+                    self.report(format!("is {number}, but must be above {limit}"));
                 }
                 _ => self.number(value, *limit, *most),
             },
@@ -168,7 +167,7 @@ impl<'a> Walk<'a, '_> {
     fn number(&mut self, value: &Value, least: f64, most: f64) {
         match value.as_f64() {
             Some(number) if number < least => {
-                self.report(format!("is {number}, but must be at least {least}"))
+                self.report(format!("is {number}, but must be at least {least}"));
             }
             Some(number) if number > most => self.report(format!("is {number}, but must be at most {most}")),
             Some(_) => {}

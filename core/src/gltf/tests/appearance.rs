@@ -87,7 +87,7 @@ fn masks_are_sharp_and_blends_are_not() {
     assert_eq!((alpha("BLEND", 0.1), alpha("BLEND", 0.9)), (1.0, 128.0 / 255.0));
     let cut = textured(json!({"alphaMode": "MASK", "alphaCutoff": 0.6,
         "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}));
-    assert_eq!(cut.load().scene.alpha(0, 0, Vec2::new(0.9, 0.0)), 0.0);
+    assert!(cut.load().scene.alpha(0, 0, Vec2::new(0.9, 0.0)) < 1e-6);
 }
 
 #[test]
@@ -113,7 +113,8 @@ fn emission_is_factor_times_strength_on_the_sides_that_emit() {
     assert_eq!(interaction.emission(Side::Back), Vec3::ZERO);
     assert_eq!((interaction.side(Vec3::Z), interaction.side(Vec3::NEG_Z)), (Side::Front, Side::Back));
     let double = textured(material(true)).load().scene;
-    assert!(double.interaction(0, 0, Vec2::new(0.75, 0.1)).emission(Side::Back).x == 10.0);
+    let back = double.interaction(0, 0, Vec2::new(0.75, 0.1)).emission(Side::Back);
+    assert!((back - expected).length() < 1e-5);
 }
 
 #[test]
@@ -142,7 +143,7 @@ fn solid_glass_without_thickness_is_pointed_out() {
     // A tetrahedron.
     let position = builder.floats("VEC3", &[0., 0., 0., 1., 0., 0., 0., 1., 0., 0., 0., 1.]);
     let indices = builder.accessor(&[0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3], 5121, "SCALAR", 12);
-    builder.primitive(json!({"attributes": {"POSITION": position}, "indices": indices, "material": 0}));
+    builder.primitive(&json!({"attributes": {"POSITION": position}, "indices": indices, "material": 0}));
     builder
         .push("materials", json!({"extensions": {"KHR_materials_transmission": {"transmissionFactor": 1}}}));
     let loaded = builder.load();
@@ -178,7 +179,7 @@ fn normal_maps_bend_along_the_layout_with_and_without_tangents() {
         let uvs = if mirrored { [0., 1., -1., 1., 0., 0.] } else { [0., 1., 1., 1., 0., 0.] };
         let uv = builder.floats("VEC2", &uvs);
         builder.primitive(
-            json!({"attributes": {"POSITION": position, "NORMAL": normal, "TEXCOORD_0": uv}, "material": 0}),
+            &json!({"attributes": {"POSITION": position, "NORMAL": normal, "TEXCOORD_0": uv}, "material": 0}),
         );
         let view = builder.view(&png(1, 1, &[[204, 166, 204, 255]]), None);
         builder.push("images", json!({"bufferView": view, "mimeType": "image/png"}));

@@ -68,7 +68,7 @@ impl Builder {
     }
 
     /// A mesh of one primitive at a node of its own.
-    pub(super) fn primitive(&mut self, primitive: Value) -> usize {
+    pub(super) fn primitive(&mut self, primitive: &Value) -> usize {
         let mesh = self.push("meshes", json!({"primitives": [primitive]}));
         self.push("nodes", json!({"mesh": mesh}))
     }
@@ -81,7 +81,7 @@ impl Builder {
         for (name, shape, numbers) in attributes {
             primitive["attributes"][*name] = json!(builder.floats(shape, numbers));
         }
-        builder.primitive(primitive);
+        builder.primitive(&primitive);
         builder
     }
 
@@ -125,7 +125,7 @@ impl Builder {
 
     /// What the reader says when it refuses the scene.
     pub(super) fn refusal(&self) -> String {
-        self.try_load().err().expect("the scene should be refused").to_string()
+        self.try_load().expect_err("the scene should be refused").to_string()
     }
 }
 

@@ -24,11 +24,7 @@ fn scene_with_files() -> (Vec<u8>, Vec<(String, Vec<u8>)>) {
 }
 
 fn error_of(bytes: Vec<u8>) -> String {
-    Bundle::open(bytes)
-        .and_then(|b| load(&b, &Limits::default()))
-        .err()
-        .expect("should be refused")
-        .to_string()
+    Bundle::open(bytes).and_then(|b| load(&b, &Limits::default())).expect_err("should be refused").to_string()
 }
 
 fn archive(files: &[(&str, &[u8])], method: CompressionMethod) -> Vec<u8> {

@@ -22,7 +22,7 @@ fn every_index_type_gives_the_same_triangle() {
         let position = builder.floats("VEC3", &[&[9.0, 9.0, 9.0], TRIANGLE.as_slice()].concat());
         let indices: Vec<u8> = [1_u32, 2, 3].iter().flat_map(|i| i.to_le_bytes()[..width].to_vec()).collect();
         let indices = builder.accessor(&indices, component, "SCALAR", 3);
-        builder.primitive(json!({"attributes": {"POSITION": position}, "indices": indices}));
+        builder.primitive(&json!({"attributes": {"POSITION": position}, "indices": indices}));
         let scene = builder.load().scene;
         assert_eq!(scene.meshes[0].positions.len(), 3, "a vertex that no triangle has is not kept");
         assert!(near(&triangles(&scene)[0], &[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]));
@@ -49,7 +49,7 @@ fn every_component_type_is_read_plain_and_normalised() {
                 "accessors",
                 json!({"bufferView": view, "componentType": component, "type": "VEC3", "count": 3, "normalized": normalised}),
             );
-            builder.primitive(json!({"attributes": {"POSITION": position}}));
+            builder.primitive(&json!({"attributes": {"POSITION": position}}));
             let size = if normalised { half / full } else { half };
             let got = triangles(&builder.load().scene)[0][1].x;
             assert!(
@@ -77,7 +77,7 @@ fn interleaved_attributes_are_read_by_their_stride() {
         )
     };
     let (position, normal) = (at(0, "VEC3"), at(12, "VEC3"));
-    builder.primitive(json!({"attributes": {"POSITION": position, "NORMAL": normal}}));
+    builder.primitive(&json!({"attributes": {"POSITION": position, "NORMAL": normal}}));
     let scene = builder.load().scene;
     assert!(near(&triangles(&scene)[0], &[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]));
     assert!((scene.meshes[0].normals[2] - Vec3::new(0.0, 0.6, 0.8)).length() < 1e-6);
@@ -98,7 +98,7 @@ fn sparse_accessors_replace_elements_with_and_without_a_base() {
             accessor["bufferView"] = json!(builder.view(&bytes(&TRIANGLE), None));
         }
         let position = builder.push("accessors", accessor);
-        builder.primitive(json!({"attributes": {"POSITION": position}}));
+        builder.primitive(&json!({"attributes": {"POSITION": position}}));
         assert!(near(
             &triangles(&builder.load().scene)[0],
             &[[0.0, 0.0, 0.0], [5.0, 0.0, 0.0], [0.0, 7.0, 0.0]]
@@ -114,7 +114,7 @@ fn strips_and_fans_become_triangles_facing_the_same_way() {
     for (mode, positions) in [(5, strip), (6, fan)] {
         let mut builder = Builder::new();
         let position = builder.floats("VEC3", &positions);
-        builder.primitive(json!({"attributes": {"POSITION": position}, "mode": mode}));
+        builder.primitive(&json!({"attributes": {"POSITION": position}, "mode": mode}));
         let scene = builder.load().scene;
         assert_eq!(scene.meshes[0].triangles.len(), 2);
         for triangle in 0..2 {
@@ -139,7 +139,7 @@ fn triangles_without_area_are_left_out_and_counted() {
     let position = builder.floats("VEC3", &[TRIANGLE.as_slice(), &[2.0, 0.0, 0.0]].concat());
     // A whole one, one with a corner twice, one whose corners lie on a line.
     let indices = builder.accessor(&[0, 1, 2, 0, 1, 1, 0, 1, 3], U8, "SCALAR", 9);
-    builder.primitive(json!({"attributes": {"POSITION": position}, "indices": indices}));
+    builder.primitive(&json!({"attributes": {"POSITION": position}, "indices": indices}));
     let loaded = builder.load();
     assert_eq!((loaded.report.triangles, loaded.report.dropped.degenerate_triangles), (1, 2));
 }
@@ -151,7 +151,7 @@ fn slivers_keep_their_normal() {
         "VEC3",
         &[1e6, 0.0, 0.0, 1e6 + 1.0, 0.0, 0.0, 1e6, 1e-30, 0.0, 2e6, 2e6, 2e6, 3e6, 2e6, 2e6, 2e6, 3e6, 2e6],
     );
-    builder.primitive(json!({"attributes": {"POSITION": position}}));
+    builder.primitive(&json!({"attributes": {"POSITION": position}}));
     let loaded = builder.load();
     for triangle in 0..loaded.report.triangles as u32 {
         assert!((loaded.scene.interaction(0, triangle, Vec2::splat(0.3)).ng - Vec3::Z).length() < 1e-6);

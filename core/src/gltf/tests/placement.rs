@@ -13,7 +13,7 @@ fn a_mesh_at_one_place_is_gathered_and_at_several_instanced() {
     let mut builder = Builder::triangle(&[], json!({}));
     builder.json["nodes"][0]["name"] = json!("first");
     let second = builder.floats("VEC3", &TRIANGLE);
-    let node = builder.primitive(json!({"attributes": {"POSITION": second}}));
+    let node = builder.primitive(&json!({"attributes": {"POSITION": second}}));
     builder.json["nodes"][node]["name"] = json!("second");
     let gathered = builder.load().scene;
     assert_eq!((gathered.meshes.len(), gathered.instances.len()), (1, 1));
@@ -59,7 +59,7 @@ fn uneven_scale_bends_normals_as_the_surface_bends() {
         let position = builder.floats("VEC3", &[0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 1.0, 1.0, 0.0]);
         let s = 0.5_f32.sqrt();
         let normal = builder.floats("VEC3", &[-s, s, 0.0, -s, s, 0.0, -s, s, 0.0]);
-        let node = builder.primitive(json!({"attributes": {"POSITION": position, "NORMAL": normal}}));
+        let node = builder.primitive(&json!({"attributes": {"POSITION": position, "NORMAL": normal}}));
         builder.json["nodes"][node]["scale"] = json!([1, 2, 1]);
         if instanced {
             builder.push("nodes", json!({"mesh": 0}));
@@ -77,8 +77,8 @@ fn uneven_scale_bends_normals_as_the_surface_bends() {
 fn bits(scene: &SceneData) -> Vec<u32> {
     let mut bits = Vec::new();
     for mesh in &scene.meshes {
-        bits.extend(mesh.positions.iter().flat_map(|p| p.to_array()).map(f32::to_bits));
-        bits.extend(mesh.normals.iter().flat_map(|p| p.to_array()).map(f32::to_bits));
+        bits.extend(mesh.positions.iter().flat_map(glam::Vec3::to_array).map(f32::to_bits));
+        bits.extend(mesh.normals.iter().flat_map(glam::Vec3::to_array).map(f32::to_bits));
     }
     for instance in &scene.instances {
         bits.extend(instance.placement.to_world().to_cols_array().map(f32::to_bits));

@@ -57,7 +57,7 @@ fn dangling_references_are_named() {
         refused(&[pointer], |b| *b.json.pointer_mut(pointer).unwrap() = value);
     }
     refused(&["/meshes/0/primitives/0/indices"], |b| {
-        b.json["meshes"][0]["primitives"][0]["indices"] = json!(7)
+        b.json["meshes"][0]["primitives"][0]["indices"] = json!(7);
     });
 }
 
@@ -123,7 +123,7 @@ fn numbers_that_are_none_are_named() {
         });
     }
     refused(&["/nodes/0", "range of numbers"], |b| {
-        b.json["nodes"][0]["scale"] = json!([1e300, 1e300, 1e300])
+        b.json["nodes"][0]["scale"] = json!([1e300, 1e300, 1e300]);
     });
     refused(&["/meshes/0/primitives/0/attributes/COLOR_0", "vertex 0"], |b| {
         b.json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] =
