@@ -112,8 +112,9 @@ impl Blobs {
     /// In a folder, which is made where it is not there. Written under a temporary name, synced,
     /// then renamed.
     pub fn folder(path: &Path) -> Result<Self> {
-        std::fs::create_dir_all(path)
-            .map_err(|e| BlobError::Failed(object_store::Error::Generic { store: "folder", source: e.into() }))?;
+        std::fs::create_dir_all(path).map_err(|e| {
+            BlobError::Failed(object_store::Error::Generic { store: "folder", source: e.into() })
+        })?;
         let store = LocalFileSystem::new_with_prefix(path)?.with_fsync(true).with_automatic_cleanup(true);
         Ok(Self { store: Arc::new(store) })
     }

@@ -18,10 +18,10 @@ use ovtigre_proto::{
     status::WorkerState,
 };
 use row::{
-    Added, Claim, CommitOutcome, Counts, IdempotencyKey, JobChange, JobFilter, JobRow, Lane, Ledger,
-    NewCheckpoint, NewCommit, NewJob, Released, SceneRow, WorkerRow,
+    Added, Claim, CommitOutcome, CommitRow, Counts, IdempotencyKey, JobChange, JobFilter, JobRow, Lane,
+    Ledger, NewCheckpoint, NewCommit, NewJob, Released, SceneRow, WorkerRow,
 };
-use std::{fmt, time::Duration};
+use std::{fmt, ops::Range, time::Duration};
 
 /// The farm's memory. Each call is one transaction: durable when it returns, without effect when
 /// it fails. Leases, pauses and losses are measured by the store's own clock.
@@ -60,6 +60,8 @@ pub trait Store: Send + Sync + fmt::Debug {
     async fn expire(&self) -> Result<Vec<Released>>;
     /// Records a batch's sum if there is none, ends its lease; otherwise compares.
     async fn commit(&self, commit: NewCommit) -> Result<CommitOutcome>;
+    /// What was brought of some blocks of a lane.
+    async fn commits(&self, job: &JobId, lane: Lane, blocks: Range<u32>) -> Result<Vec<CommitRow>>;
     /// Remembers that the first `blocks` blocks of a lane are kept as one blob.
     async fn set_snapshot(&self, job: &JobId, lane: Lane, blocks: u32) -> Result<()>;
     /// Adds a checkpoint; again changes nothing.
@@ -71,6 +73,8 @@ pub trait Store: Send + Sync + fmt::Debug {
     async fn add_worker(&self, id: &WorkerId, join: WorkerJoin) -> Result<()>;
     /// A worker is heard of, and stands so from now on; false where there is none.
     async fn see_worker(&self, id: &WorkerId, state: WorkerState) -> Result<bool>;
+    /// A worker stands so from now on; false where there is none.
+    async fn set_worker_state(&self, id: &WorkerId, state: WorkerState) -> Result<bool>;
     /// A worker.
     async fn worker(&self, id: &WorkerId) -> Result<Option<WorkerRow>>;
     /// Workers that joined before the one with sequence `before`, the newest first, with their sequences.

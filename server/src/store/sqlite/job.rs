@@ -37,7 +37,11 @@ pub(super) async fn scene(db: &mut SqliteConnection, id: &BlobId) -> Result<Opti
 }
 
 /// Adds a job with a cursor at block 0 of each lane, unless `key` was used before.
-pub(super) async fn add(db: &mut SqliteConnection, job: NewJob, key: Option<IdempotencyKey>) -> Result<Added> {
+pub(super) async fn add(
+    db: &mut SqliteConnection,
+    job: NewJob,
+    key: Option<IdempotencyKey>,
+) -> Result<Added> {
     let now = now(db).await?;
     if let Some(IdempotencyKey { key, fingerprint }) = key {
         let before: Option<(String, String)> =
@@ -143,7 +147,12 @@ fn read(row: &SqliteRow) -> Result<JobRow> {
 }
 
 /// Changes a job that still has `version`.
-pub(super) async fn change(db: &mut SqliteConnection, id: &JobId, version: u64, change: JobChange) -> Result<bool> {
+pub(super) async fn change(
+    db: &mut SqliteConnection,
+    id: &JobId,
+    version: u64,
+    change: JobChange,
+) -> Result<bool> {
     let now = now(db).await?;
     let counted = sqlx::query(
         "UPDATE job SET version = version + 1, priority = coalesce(?3, priority), reason = coalesce(?4, reason)

@@ -6,8 +6,8 @@ use crate::store::{
     row::{BatchKey, Claim, CommitRow, Lane, LeaseRow, Ledger, Released},
 };
 use ovtigre_proto::id::{JobId, LeaseId, WorkerId};
-use sqlx::{Row as _, SqliteConnection};
-use std::time::Duration;
+use sqlx::{Row as _, SqliteConnection, sqlite::SqliteRow};
+use std::{ops::Range, time::Duration};
 
 /// What a job's work looks like.
 pub(super) async fn read(db: &mut SqliteConnection, job: &JobId) -> Result<Ledger> {
@@ -28,11 +28,7 @@ pub(super) async fn read(db: &mut SqliteConnection, job: &JobId) -> Result<Ledge
     }
     let rows = sqlx::query("SELECT region, replicate, block, hash, worker_micros FROM commits WHERE job = ?");
     for row in rows.bind(id).fetch_all(&mut *db).await? {
-        ledger.commits.push(CommitRow {
-            batch: batch(&row)?,
-            hash: parse(&row, "hash")?,
-            worker_micros: count(&row, "worker_micros")?,
-        });
+        ledger.commits.push(commit(&row)?);
     }
     let rows = sqlx::query("SELECT region, replicate, blocks AS block FROM snapshot WHERE job = ?");
     for row in rows.bind(id).fetch_all(&mut *db).await? {
@@ -45,8 +41,35 @@ pub(super) async fn read(db: &mut SqliteConnection, job: &JobId) -> Result<Ledge
     Ok(ledger)
 }
 
+fn commit(row: &SqliteRow) -> Result<CommitRow> {
+    Ok(CommitRow {
+        batch: batch(row)?,
+        hash: parse(row, "hash")?,
+        worker_micros: count(row, "worker_micros")?,
+    })
+}
+
+/// What was brought of some blocks of a lane.
+pub(super) async fn commits(
+    db: &mut SqliteConnection,
+    job: &JobId,
+    lane: Lane,
+    blocks: Range<u32>,
+) -> Result<Vec<CommitRow>> {
+    let rows = sqlx::query(
+        "SELECT region, replicate, block, hash, worker_micros FROM commits
+         WHERE job = ? AND region = ? AND replicate = ? AND block >= ? AND block < ? ORDER BY block",
+    );
+    let rows = rows.bind(job.as_str()).bind(lane.region).bind(lane.replicate);
+    rows.bind(blocks.start).bind(blocks.end).fetch_all(db).await?.iter().map(commit).collect()
+}
+
 /// Hands out each batch that may be.
-pub(super) async fn claim(db: &mut SqliteConnection, claims: Vec<Claim>, time: Duration) -> Result<Vec<bool>> {
+pub(super) async fn claim(
+    db: &mut SqliteConnection,
+    claims: Vec<Claim>,
+    time: Duration,
+) -> Result<Vec<bool>> {
     let now = now(db).await?;
     let mut claimed = Vec::with_capacity(claims.len());
     for one in claims {
@@ -208,7 +231,12 @@ async fn take_back(
 }
 
 /// Remembers how far a lane is kept as one blob.
-pub(super) async fn set_snapshot(db: &mut SqliteConnection, job: &JobId, lane: Lane, blocks: u32) -> Result<()> {
+pub(super) async fn set_snapshot(
+    db: &mut SqliteConnection,
+    job: &JobId,
+    lane: Lane,
+    blocks: u32,
+) -> Result<()> {
     sqlx::query(
         "INSERT INTO snapshot (job, region, replicate, blocks) VALUES (?, ?, ?, ?)
          ON CONFLICT (job, region, replicate) DO UPDATE SET blocks = excluded.blocks",

@@ -11,8 +11,8 @@ use super::{
     Store,
     error::{Result, StoreError},
     row::{
-        Added, Claim, CommitOutcome, Counts, IdempotencyKey, JobChange, JobFilter, JobRow, Lane, Ledger,
-        NewCheckpoint, NewCommit, NewJob, Released, SceneRow, WorkerRow,
+        Added, Claim, CommitOutcome, CommitRow, Counts, IdempotencyKey, JobChange, JobFilter, JobRow, Lane,
+        Ledger, NewCheckpoint, NewCommit, NewJob, Released, SceneRow, WorkerRow,
     },
 };
 use ovtigre_proto::{
@@ -29,7 +29,7 @@ use sqlx::{
         Sqlite as Driver, SqliteConnectOptions, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous,
     },
 };
-use std::{path::Path, time::Duration};
+use std::{ops::Range, path::Path, time::Duration};
 
 /// Readers at a time.
 const READERS: u32 = 4;
@@ -140,6 +140,10 @@ impl Store for Sqlite {
         self.writer.write(|db| Box::pin(commit::commit(db, commit))).await
     }
 
+    async fn commits(&self, job: &JobId, lane: Lane, blocks: Range<u32>) -> Result<Vec<CommitRow>> {
+        ledger::commits(&mut *self.reader().await?, job, lane, blocks).await
+    }
+
     async fn set_snapshot(&self, job: &JobId, lane: Lane, blocks: u32) -> Result<()> {
         let job = job.clone();
         self.writer
@@ -166,6 +170,11 @@ impl Store for Sqlite {
     async fn see_worker(&self, id: &WorkerId, state: WorkerState) -> Result<bool> {
         let id = id.clone();
         self.writer.write(move |db| Box::pin(async move { worker::see(db, &id, state).await })).await
+    }
+
+    async fn set_worker_state(&self, id: &WorkerId, state: WorkerState) -> Result<bool> {
+        let id = id.clone();
+        self.writer.write(move |db| Box::pin(async move { worker::set_state(db, &id, state).await })).await
     }
 
     async fn worker(&self, id: &WorkerId) -> Result<Option<WorkerRow>> {

@@ -38,6 +38,13 @@ pub(super) async fn see(db: &mut SqliteConnection, id: &WorkerId, state: WorkerS
     Ok(seen.rows_affected() > 0)
 }
 
+/// A worker stands so from now on.
+pub(super) async fn set_state(db: &mut SqliteConnection, id: &WorkerId, state: WorkerState) -> Result<bool> {
+    let set = sqlx::query("UPDATE worker SET state = ? WHERE id = ?");
+    let set = set.bind(worker_state_name(state)).bind(id.as_str()).execute(db).await?;
+    Ok(set.rows_affected() > 0)
+}
+
 const SELECT: &str = "SELECT *, (SELECT count(*) FROM lease WHERE lease.worker = worker.id) AS leases,
     (SELECT lease.job FROM lease WHERE lease.worker = worker.id ORDER BY granted_ms LIMIT 1) AS job FROM worker ";
 
