@@ -96,6 +96,11 @@ impl Farm {
         self.store.worker(id).await?.ok_or_else(|| FarmError::not_found("worker", id))
     }
 
+    /// A worker.
+    pub async fn worker(&self, id: &WorkerId) -> Result<WorkerStatus> {
+        self.worker_row(id).await.map(worker_status)
+    }
+
     /// Workers, the newest first.
     pub async fn workers(&self, before: Option<i64>, limit: u32) -> Result<Page<WorkerStatus>> {
         let limit = limit.clamp(1, PAGE_MAX);
