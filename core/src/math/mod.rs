@@ -5,4 +5,5 @@ pub mod colour;
 pub mod frame;
 pub mod quantile;
 pub mod robust;
+pub mod spherical_triangle;
 pub mod warp;

@@ -1,0 +1,34 @@
+//! What a glTF material says at one point.
+
+use crate::math::colour::Rgb;
+
+/// What is behind a transmitting surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Walls {
+    /// A sheet without thickness: light passes without being bent.
+    Thin,
+    /// A solid: the side of −z is inside, and light is refracted.
+    Solid,
+}
+
+/// A glTF metallic-roughness surface with `KHR_materials_specular`, `_ior`, `_transmission` and
+/// `_volume`, all textures applied. Numbers outside their range are clamped when a BSDF is built.
+#[derive(Clone, Copy, Debug)]
+pub struct SurfaceParameters {
+    /// Linear Rec.709, in 0..=1.
+    pub base_color: Rgb,
+    /// 0 dielectric, 1 metal.
+    pub metallic: f32,
+    /// Perceptual: α is its square.
+    pub roughness: f32,
+    /// `specularFactor`, in 0..=1.
+    pub specular: f32,
+    /// `specularColorFactor`, not negative.
+    pub specular_color: Rgb,
+    /// Refractive index of the inside over that of the outside; 0 means infinite, as in glTF.
+    pub ior: f32,
+    /// `transmissionFactor`, in 0..=1.
+    pub transmission: f32,
+    /// What transmitted light enters.
+    pub walls: Walls,
+}
