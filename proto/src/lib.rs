@@ -1,12 +1,12 @@
 //! The words that the farm, its workers and its clients share: data, and a client that speaks them. No rules.
 
-pub mod id;
-pub mod pair;
-pub mod job;
-pub mod status;
+pub mod client;
 pub mod curve;
-pub mod scene;
+pub mod id;
+pub mod job;
 pub mod lease;
+pub mod pair;
 pub mod problem;
 pub mod route;
-pub mod client;
+pub mod scene;
+pub mod status;
