@@ -2,14 +2,14 @@
 //!
 //! The rooms, bottom to top; a room uses only those above it in this list.
 
-pub mod math;
-pub mod sampler;
 pub mod bsdf;
-pub mod trace;
 pub mod film;
-pub mod scene;
 pub mod gltf;
-pub mod settings;
-pub mod path;
+pub mod math;
 pub mod method;
+pub mod path;
 pub mod render;
+pub mod sampler;
+pub mod scene;
+pub mod settings;
+pub mod trace;

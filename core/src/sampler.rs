@@ -1,1 +1,208 @@
 //! Numbers as a function of (seed, replicate, pixel, index, dimension).
+//!
+//! Each dimension is an Owen-scrambled pair of the first two Sobol' dimensions whose index is
+//! shuffled by nested uniform scrambling, so that aligned dyadic runs of indices stay nets in every
+//! dimension and different dimensions are independent ("padding"; Burley 2020, "Practical
+//! Hash-based Owen Scrambling").
+
+use glam::Vec2;
+
+/// One sample's numbers. A pure function of its arguments: it does not matter which other samples are drawn.
+#[derive(Clone, Copy, Debug)]
+pub struct Sampler {
+    key: u64,
+    index: u32,
+}
+
+/// Which pair of numbers of a sample. Places are fixed, so that leaving a technique out shifts no other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Dimension {
+    /// Place in the pixel.
+    Film,
+    /// Place on the lens.
+    Lens,
+    /// At the n-th scattering of the eye subpath, from 0.
+    Eye(u32, Use),
+}
+
+/// What a number is used for at a scattering.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Use {
+    /// Choice of lobe, and roulette.
+    Choice,
+    /// Direction.
+    Direction,
+    /// Choice of light.
+    Light,
+    /// Place on the light.
+    LightPoint,
+    /// Whether what is partly transparent is hit, on the way there.
+    Alpha,
+}
+
+/// Dimensions before the first scattering.
+const FIRST_SCATTERING: u32 = 4;
+/// Dimensions a scattering.
+const SCATTERING: u32 = 8;
+
+impl Dimension {
+    fn number(self) -> u32 {
+        match self {
+            Self::Film => 0,
+            Self::Lens => 1,
+            Self::Eye(n, what) => FIRST_SCATTERING + SCATTERING * n + what as u32,
+        }
+    }
+}
+
+impl Sampler {
+    /// The numbers of sample `index` of a pixel in a replicate.
+    pub fn new(seed: u64, replicate: u32, pixel: [u32; 2], index: u32) -> Self {
+        let place = u64::from(pixel[0]) << 32 | u64::from(pixel[1]);
+        Self { key: mix(mix(mix(seed) ^ place) ^ u64::from(replicate)), index }
+    }
+
+    /// Two numbers in [0, 1), well spread over the indices of a pixel.
+    #[inline]
+    pub fn pair(&self, dimension: Dimension) -> Vec2 {
+        let key = mix(self.key ^ u64::from(dimension.number()));
+        let index = shuffle(self.index, key as u32);
+        let scrambles = mix(key);
+        let x = scramble(index, scrambles as u32).reverse_bits();
+        let y = scramble(pascal(index), (scrambles >> 32) as u32).reverse_bits();
+        Vec2::new(unit(x), unit(y))
+    }
+
+    /// A key for decisions that are independent of one another and of every other number:
+    /// see [`decide`].
+    #[inline]
+    pub fn key(&self, dimension: Dimension) -> u64 {
+        mix(mix(self.key ^ u64::from(dimension.number())) ^ u64::from(self.index))
+    }
+}
+
+/// A number in [0, 1) as a function of a key and what is decided about.
+#[inline]
+pub fn decide(key: u64, what: u64) -> f32 {
+    unit((mix(key ^ mix(what)) >> 32) as u32)
+}
+
+/// The upper 24 bits as a number in [0, 1).
+#[inline]
+fn unit(bits: u32) -> f32 {
+    (bits >> 8) as f32 * (1.0 / 16_777_216.0)
+}
+
+/// A bijection of 64 bits in which every bit of the result depends on every bit given (the
+/// finaliser of `SplitMix64`; Steele et al. 2014).
+#[inline]
+fn mix(z: u64) -> u64 {
+    let z = z.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}
+
+/// Flips each bit by a hash of the bits below it (Laine and Karras 2011, with the constants of
+/// Vegdahl 2021): on bit-reversed fractions this is nested uniform scrambling.
+#[inline]
+fn scramble(x: u32, seed: u32) -> u32 {
+    let x = x ^ x.wrapping_mul(0x3d20_adea);
+    let x = x.wrapping_add(seed);
+    let x = x.wrapping_mul((seed >> 16) | 1);
+    let x = x ^ x.wrapping_mul(0x0552_6c56);
+    x ^ x.wrapping_mul(0x53a2_2864)
+}
+
+/// Nested uniform scrambling of an index: aligned dyadic ranges go to aligned dyadic ranges.
+#[inline]
+fn shuffle(index: u32, seed: u32) -> u32 {
+    scramble(index.reverse_bits(), seed).reverse_bits()
+}
+
+/// The second Sobol' dimension before bit reversal: multiplication with Pascal's triangle modulo
+/// 2, whose entry (i, j) is one where the bits of i are among those of j.
+#[inline]
+fn pascal(mut x: u32) -> u32 {
+    x ^= (x >> 1) & 0x5555_5555;
+    x ^= (x >> 2) & 0x3333_3333;
+    x ^= (x >> 4) & 0x0f0f_0f0f;
+    x ^= (x >> 8) & 0x00ff_00ff;
+    x ^ ((x >> 16) & 0x0000_ffff)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_second_dimension_is_that_of_its_direction_numbers() {
+        for index in (0..5000).chain([u32::MAX, 0x8000_0001]) {
+            let mut expected = 0;
+            let mut direction = 1_u32 << 31;
+            for bit in 0..32 {
+                if index >> bit & 1 == 1 {
+                    expected ^= direction;
+                }
+                direction ^= direction >> 1;
+            }
+            assert_eq!(pascal(index).reverse_bits(), expected);
+        }
+    }
+
+    #[test]
+    fn every_aligned_dyadic_block_is_a_net_in_every_dimension() {
+        for (start, log) in [(0_u32, 6), (64, 6), (256, 8), (1 << 20, 4), (96, 5)] {
+            let count = 1_u32 << log;
+            for dimension in
+                [Dimension::Film, Dimension::Eye(3, Use::Direction), Dimension::Eye(70, Use::Light)]
+            {
+                let points: Vec<Vec2> = (start..start + count)
+                    .map(|index| Sampler::new(7, 2, [10, 20], index).pair(dimension))
+                    .collect();
+                for columns_log in 0..=log {
+                    let (columns, rows) = (1 << columns_log, 1 << (log - columns_log));
+                    let mut cells = vec![0; count as usize];
+                    for p in &points {
+                        let (x, y) = ((p.x * columns as f32) as usize, (p.y * rows as f32) as usize);
+                        cells[y * columns as usize + x] += 1;
+                    }
+                    assert!(cells.iter().all(|n| *n == 1), "{dimension:?} {start} {columns}x{rows}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn replicates_pixels_and_dimensions_are_uncorrelated() {
+        let n = 1 << 14;
+        let correlation = |a: &dyn Fn(u32) -> f32, b: &dyn Fn(u32) -> f32| {
+            (0..n).map(|i| f64::from(a(i) - 0.5) * f64::from(b(i) - 0.5)).sum::<f64>() / f64::from(n) * 12.0
+        };
+        let at =
+            |replicate, pixel, dimension| move |i| Sampler::new(1, replicate, pixel, i).pair(dimension).x;
+        let first = at(0, [0, 0], Dimension::Film);
+        let bound = 4.0 / f64::from(n).sqrt();
+        for other in
+            [at(1, [0, 0], Dimension::Film), at(0, [1, 0], Dimension::Film), at(0, [0, 0], Dimension::Lens)]
+        {
+            assert!(correlation(&first, &other).abs() < bound);
+        }
+        let y = |i| Sampler::new(1, 0, [0, 0], i).pair(Dimension::Film).y;
+        assert!(correlation(&first, &y).abs() < bound);
+    }
+
+    #[test]
+    fn decisions_are_uniform() {
+        let mut bins = [0_u32; 64];
+        let n = 1 << 16;
+        for i in 0..n {
+            let key = Sampler::new(3, 0, [5, 5], i).key(Dimension::Eye(0, Use::Alpha));
+            bins[(decide(key, 77) * 64.0) as usize] += 1;
+        }
+        let expected = f64::from(n) / 64.0;
+        let chi2: f64 = bins.iter().map(|b| (f64::from(*b) - expected).powi(2) / expected).sum();
+        // 63 degrees of freedom: the 99.99 % quantile is 112.
+        assert!(chi2 < 112.0, "{chi2}");
+    }
+}

@@ -1,3 +1,4 @@
 //! One file a lobe, and the enum of what a surface does to light.
 
 pub mod event;
+pub mod surface;

@@ -1,0 +1,200 @@
+//! The error of a whole picture from the spread between its replicates.
+
+use super::{append::Prefix, size::Region};
+use crate::math::quantile::student_t_upper;
+
+/// Share of the picture's mean luminance that keeps black pixels from counting without bound.
+pub(super) const EPSILON: f64 = 0.01;
+/// Probability that a job is ever stopped too early, over all its checkpoints together.
+pub const FALSE_STOP_PROBABILITY: f64 = 0.05;
+
+/// Errors of a picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ErrorEstimate {
+    /// √(mean over pixels and channels of the variance of the mean).
+    pub rms: f64,
+    /// √(mean over pixels of [Σ_c v / 3] / (Y² + ε Ȳ²)), Y the 3×3 mean luminance.
+    pub relative: f64,
+    /// Upper end of the interval of `relative`; needs three replicates.
+    pub relative_upper: Option<f64>,
+}
+
+/// The error of `prefixes[region][replicate]`, whose regions are bands that cover `region`; `None`
+/// for a single replicate or where a replicate has no samples. `look` counts the checkpoints from 1: the k-th look spends
+/// 6α/(π²k²) of the probability α of a false stop, so that all looks together spend α.
+///
+/// The interval is a jackknife over replicates: pixels may be correlated, replicates are not.
+pub fn estimate(region: Region, prefixes: &[Vec<Prefix>], look: u32) -> Option<ErrorEstimate> {
+    let replicates = replicate_means(prefixes)?;
+    let count = replicates.len();
+    let all: Vec<&[f64]> = replicates.iter().map(Vec::as_slice).collect();
+    let (rms, relative) = mean_squares(region, &all);
+    let relative_upper = (count >= 3).then(|| {
+        let pseudo_values: Vec<f64> = (0..count)
+            .map(|left_out| {
+                let rest: Vec<&[f64]> = (0..count).filter(|r| *r != left_out).map(|r| all[r]).collect();
+                let (_, without) = mean_squares(region, &rest);
+                count as f64 * relative - (count - 1) as f64 * without * (count - 1) as f64 / count as f64
+            })
+            .collect();
+        upper(relative, &pseudo_values, look).sqrt()
+    });
+    Some(ErrorEstimate { rms: rms.sqrt(), relative: relative.sqrt(), relative_upper })
+}
+
+/// Upper end of a one-sided interval around `centre` from jackknife pseudo-values.
+fn upper(centre: f64, pseudo_values: &[f64], look: u32) -> f64 {
+    let n = pseudo_values.len() as f64;
+    let mean = pseudo_values.iter().sum::<f64>() / n;
+    let variance = pseudo_values.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / (n * (n - 1.0));
+    let k = f64::from(look.max(1));
+    let alpha = 6.0 * FALSE_STOP_PROBABILITY / (core::f64::consts::PI * core::f64::consts::PI * k * k);
+    centre.max(mean) + student_t_upper(alpha, pseudo_values.len() as u32 - 1) * variance.sqrt()
+}
+
+/// Means of each replicate over all regions, three channels a pixel; `None` where there is only
+/// one replicate, or one without samples.
+fn replicate_means(prefixes: &[Vec<Prefix>]) -> Option<Vec<Vec<f64>>> {
+    let count = prefixes.first().map_or(0, Vec::len);
+    if count < 2 || prefixes.iter().flatten().any(|p| p.samples() == 0) {
+        return None;
+    }
+    let mean = |prefix: &Prefix| -> Vec<f64> {
+        let scale = 1.0 / f64::from(prefix.samples());
+        prefix.layer(0).iter().map(|s| s * scale).collect()
+    };
+    Some((0..count).map(|r| prefixes.iter().flat_map(|region| mean(&region[r])).collect()).collect())
+}
+
+/// Mean square error and mean relative square error of the mean of `replicates`.
+fn mean_squares(region: Region, replicates: &[&[f64]]) -> (f64, f64) {
+    let (width, height) = (region.width as usize, region.height as usize);
+    let r = replicates.len() as f64;
+    let pixels = region.pixels();
+    let mut luminance = Vec::with_capacity(pixels);
+    let mut variance = Vec::with_capacity(pixels);
+    for pixel in 0..pixels {
+        let mut y = 0.0;
+        let mut v = 0.0;
+        for (c, weight) in [0.2126, 0.7152, 0.0722].into_iter().enumerate() {
+            let i = pixel * 3 + c;
+            let mean = replicates.iter().map(|x| x[i]).sum::<f64>() / r;
+            v += replicates.iter().map(|x| (x[i] - mean) * (x[i] - mean)).sum::<f64>() / (r * (r - 1.0));
+            y += weight * mean;
+        }
+        luminance.push(y);
+        variance.push(v / 3.0);
+    }
+    let mean_luminance = luminance.iter().sum::<f64>() / pixels as f64;
+    let floor = EPSILON * mean_luminance * mean_luminance;
+    let mut relative = 0.0;
+    for y in 0..height {
+        for x in 0..width {
+            let local = window_mean(&luminance, width, height, x, y);
+            let square = local * local + floor;
+            if square > 0.0 {
+                relative += variance[y * width + x] / square;
+            }
+        }
+    }
+    (variance.iter().sum::<f64>() / pixels as f64, relative / pixels as f64)
+}
+
+/// Mean over the pixels of a 3×3 window that lie in the picture.
+pub(super) fn window_mean(values: &[f64], width: usize, height: usize, x: usize, y: usize) -> f64 {
+    let (mut sum, mut n) = (0.0, 0.0);
+    for v in y.saturating_sub(1)..(y + 2).min(height) {
+        for u in x.saturating_sub(1)..(x + 2).min(width) {
+            sum += values[v * width + u];
+            n += 1.0;
+        }
+    }
+    sum / n
+}
+
+/// Slope of the line of least squares through (log seconds, log error); `None` for fewer than two
+/// distinct points.
+pub fn slope(points: &[(f64, f64)]) -> Option<f64> {
+    let logs: Vec<(f64, f64)> = (points.iter().filter(|(t, e)| *t > 0.0 && *e > 0.0))
+        .map(|&(t, e)| (libm::log(t), libm::log(e)))
+        .collect();
+    let n = logs.len() as f64;
+    let (mx, my) = logs.iter().fold((0.0, 0.0), |(a, b), (x, y)| (a + x / n, b + y / n));
+    let sxx: f64 = logs.iter().map(|(x, _)| (x - mx) * (x - mx)).sum();
+    let sxy: f64 = logs.iter().map(|(x, y)| (x - mx) * (y - my)).sum();
+    (logs.len() >= 2 && sxx > 1e-9).then(|| sxy / sxx)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::{invalid::InvalidSamples, schedule::Schedule, size::Size, sum::Sum};
+
+    /// Uniform numbers in 0..1 from a counter (PCG output of an LCG).
+    fn noise(state: &mut u64) -> f32 {
+        *state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        let x = (((*state >> 18) ^ *state) >> 27) as u32;
+        x.rotate_right((*state >> 59) as u32) as f32 / 4294967296.0
+    }
+
+    fn prefixes(size: Size, replicates: u32, state: &mut u64) -> Vec<Vec<Prefix>> {
+        let schedule = Schedule::new(size.frame(), 1, replicates, 1);
+        let one = (0..replicates).map(|r| {
+            let mut prefix = Prefix::empty(size.frame(), r, 1);
+            // Mean 1/2, variance 1/12.
+            let plane = (0..size.frame().pixels()).map(|_| [noise(state), noise(state), noise(state)]);
+            let (batch, planes) = (schedule.batch(0, r, 0).unwrap(), vec![plane.collect()]);
+            prefix.append(&Sum { batch, planes, invalid: InvalidSamples::default(), rays: 0 }).unwrap();
+            prefix
+        });
+        vec![one.collect()]
+    }
+
+    #[test]
+    fn the_rms_error_of_uniform_noise_is_known_and_does_not_change_with_exposure() {
+        let size = Size { width: 64, height: 64 };
+        let e = estimate(size.frame(), &prefixes(size, 4, &mut 7), 1).unwrap();
+        // σ² of the mean of 4: 1/48. 12288 estimates with 3 degrees of freedom: 0.74 % of σ² a standard deviation.
+        let expected = (1.0_f64 / 48.0).sqrt();
+        assert!((e.rms / expected - 1.0).abs() < 0.012, "{e:?}");
+        assert!(e.relative_upper.unwrap() > e.relative);
+    }
+
+    #[test]
+    fn the_upper_end_covers_the_true_relative_error_as_often_as_it_says() {
+        let size = Size { width: 12, height: 12 };
+        let truth = {
+            let mut squares = 0.0;
+            let mut state = 99;
+            for _ in 0..400 {
+                squares +=
+                    estimate(size.frame(), &prefixes(size, 4, &mut state), 1).unwrap().relative.powi(2);
+            }
+            (squares / 400.0_f64).sqrt()
+        };
+        let mut state = 1;
+        let trials = 400;
+        let covered = (0..trials)
+            .filter(|_| {
+                let e = estimate(size.frame(), &prefixes(size, 4, &mut state), 1).unwrap();
+                e.relative_upper.unwrap() >= truth
+            })
+            .count();
+        // The first look claims 1 − 6·0.05/π² = 0.9696; binomial σ is 0.0086.
+        assert!(covered as f64 / f64::from(trials) > 0.9696 - 3.0 * 0.0086, "{covered} of {trials}");
+    }
+
+    #[test]
+    fn one_replicate_has_no_error_and_two_have_no_interval() {
+        let size = Size { width: 4, height: 4 };
+        assert_eq!(estimate(size.frame(), &prefixes(size, 1, &mut 3), 1), None);
+        assert_eq!(estimate(size.frame(), &prefixes(size, 2, &mut 3), 1).unwrap().relative_upper, None);
+    }
+
+    #[test]
+    fn the_slope_of_a_power_law_is_its_exponent() {
+        let points: Vec<(f64, f64)> = (1..6).map(|i| (f64::from(i), 3.0 / f64::from(i).sqrt())).collect();
+        assert!((slope(&points).unwrap() + 0.5).abs() < 1e-12);
+        assert_eq!(slope(&points[..1]), None);
+    }
+}

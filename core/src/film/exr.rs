@@ -1,0 +1,342 @@
+//! Partial sums and pictures as `OpenEXR` files, and back.
+
+use super::{
+    batch::{Batch, Block},
+    estimate::Picture,
+    invalid::InvalidSamples,
+    size::{Region, Size},
+    sum::{Plane, Sum},
+};
+use exr::prelude::{
+    AnyChannel, AnyChannels, AttributeValue, Encoding, FlatSamples, Image, IntegerBounds, Layer,
+    LayerAttributes, ReadChannels as _, ReadLayers as _, Text, Vec2, WritableImage as _, read,
+};
+use std::{collections::BTreeMap, io::Cursor};
+
+/// Why bytes are not the EXR that was expected.
+#[derive(Debug, thiserror::Error)]
+pub enum ExrError {
+    /// Not an EXR, or a damaged one.
+    #[error("not a readable EXR: {0}")]
+    Unreadable(String),
+    /// More pixels or channels than allowed.
+    #[error("the EXR has {got} values, more than the {limit} that are expected here")]
+    TooLarge {
+        /// Values in the file.
+        got: u64,
+        /// Values at most.
+        limit: u64,
+    },
+    /// An attribute is missing or wrong.
+    #[error("the attribute '{0}' is missing or is not what a partial sum says")]
+    Attribute(&'static str),
+    /// A channel is missing, or has another type or size.
+    #[error("channel '{0}' is missing, or is not 32-bit float of the region's size")]
+    Channel(String),
+    /// A value that no sum can have.
+    #[error("{value} in channel '{channel}': sums are finite")]
+    NotFinite {
+        /// Which channel.
+        channel: String,
+        /// Which value.
+        value: f32,
+    },
+}
+
+/// Whose sum it is; the rest of a partial EXR's attributes is in the [`Sum`].
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PartialAttributes {
+    /// The job's id.
+    pub job: String,
+    /// The scene's hash.
+    pub scene: String,
+    /// The method's name.
+    pub method: String,
+}
+
+/// What a picture's attributes say.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PictureAttributes {
+    /// The job's id.
+    pub job: String,
+    /// The scene's hash.
+    pub scene: String,
+    /// Samples a pixel.
+    pub samples: f64,
+    /// The seed.
+    pub seed: u64,
+    /// The method's name.
+    pub method: String,
+    /// The path expression.
+    pub paths: String,
+    /// Hash of the set of batches in the picture.
+    pub manifest: String,
+    /// Time workers spent, summed.
+    pub render_seconds: f64,
+    /// Program and version.
+    pub software: String,
+    /// `YYYY:MM:DD hh:mm:ss`.
+    pub capture_date: String,
+}
+
+/// Any EXR's channels: name to values, row by row.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Layers {
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Values by full channel name.
+    pub channels: BTreeMap<String, Vec<f32>>,
+    /// Text attributes.
+    pub attributes: BTreeMap<String, String>,
+}
+
+const CHANNELS: [&str; 3] = ["R", "G", "B"];
+
+/// `R`, `G`, `B` for the picture, `NAME.R` … for a layer.
+fn channel_name(prefix: &str, channel: usize) -> String {
+    if prefix.is_empty() { CHANNELS[channel].to_owned() } else { format!("{prefix}.{}", CHANNELS[channel]) }
+}
+
+fn plane_prefix(plane: usize) -> String {
+    if plane == 0 { String::new() } else { format!("layer{plane}") }
+}
+
+/// A partial EXR: sums, uncompressed, that say which samples they are.
+pub fn write_partial(sum: &Sum, frame: Size, attributes: &PartialAttributes) -> Vec<u8> {
+    let Batch { region, replicate, block } = sum.batch;
+    assert!(region.is_in(frame), "the batch's region {region} is not in the frame {frame}");
+    for plane in &sum.planes {
+        assert_eq!(plane.len(), region.pixels(), "a plane of another size than its region");
+    }
+    let samples = block.samples();
+    let named = [
+        ("ovtigre.semantics", "sum".to_owned()),
+        ("ovtigre.job", attributes.job.clone()),
+        ("ovtigre.scene", attributes.scene.clone()),
+        ("ovtigre.method", attributes.method.clone()),
+        ("ovtigre.region", region.to_string()),
+        ("ovtigre.replicate", replicate.to_string()),
+        ("ovtigre.block", block.index.to_string()),
+        ("ovtigre.samples", format!("{}..{}", samples.start, samples.end)),
+        ("ovtigre.rays", sum.rays.to_string()),
+        ("ovtigre.invalid", invalid_text(sum.invalid)),
+    ];
+    let planes: Vec<(String, &Plane)> =
+        sum.planes.iter().enumerate().map(|(i, plane)| (plane_prefix(i), plane)).collect();
+    let texts = named.map(|(name, value)| (name, AttributeValue::Text(text(&value))));
+    encode(&planes, frame, region, texts.to_vec(), Encoding::UNCOMPRESSED, LayerAttributes::default())
+}
+
+/// What [`write_partial`] wrote; refuses more than `pixels_max` pixels, values that are not
+/// finite, and a header that contradicts itself.
+pub fn read_partial(bytes: &[u8], pixels_max: usize) -> Result<(Sum, PartialAttributes), ExrError> {
+    let layers = decode(bytes, pixels_max as u64 * 3 * 64)?;
+    let find = |name: &'static str| layers.attributes.get(name).ok_or(ExrError::Attribute(name));
+    fn number<T: std::str::FromStr>(text: &str, name: &'static str) -> Result<T, ExrError> {
+        text.parse().map_err(|_| ExrError::Attribute(name))
+    }
+    if find("ovtigre.semantics")? != "sum" {
+        return Err(ExrError::Attribute("ovtigre.semantics"));
+    }
+    let region: Region = number(find("ovtigre.region")?, "ovtigre.region")?;
+    if (region.width as usize, region.height as usize) != (layers.width, layers.height) {
+        return Err(ExrError::Attribute("ovtigre.region"));
+    }
+    let (start, end) =
+        find("ovtigre.samples")?.split_once("..").ok_or(ExrError::Attribute("ovtigre.samples"))?;
+    let (start, end): (u32, u32) = (number(start, "ovtigre.samples")?, number(end, "ovtigre.samples")?);
+    let count = end.checked_sub(start).filter(|n| *n > 0).ok_or(ExrError::Attribute("ovtigre.samples"))?;
+    let index = number(find("ovtigre.block")?, "ovtigre.block")?;
+    let replicate = number(find("ovtigre.replicate")?, "ovtigre.replicate")?;
+    let batch = Batch { region, replicate, block: Block { index, start, count } };
+    let planes = (0..layers.channels.len() / 3)
+        .map(|plane| sum_plane(&layers, &plane_prefix(plane)))
+        .collect::<Result<Vec<Plane>, ExrError>>()?;
+    if planes.is_empty() || layers.channels.len() % 3 != 0 {
+        return Err(ExrError::Channel("R".to_owned()));
+    }
+    let sum = Sum {
+        batch,
+        planes,
+        invalid: invalid_from(find("ovtigre.invalid")?).ok_or(ExrError::Attribute("ovtigre.invalid"))?,
+        rays: number(find("ovtigre.rays")?, "ovtigre.rays")?,
+    };
+    let attributes = PartialAttributes {
+        job: find("ovtigre.job")?.clone(),
+        scene: find("ovtigre.scene")?.clone(),
+        method: find("ovtigre.method")?.clone(),
+    };
+    Ok((sum, attributes))
+}
+
+fn sum_plane(layers: &Layers, prefix: &str) -> Result<Plane, ExrError> {
+    let pixels = layers.width * layers.height;
+    let mut plane = vec![[0.0; 3]; pixels];
+    for c in 0..3 {
+        let name = channel_name(prefix, c);
+        let values = layers.channels.get(&name).filter(|v| v.len() == pixels);
+        let values = values.ok_or_else(|| ExrError::Channel(name.clone()))?;
+        for (pixel, &value) in plane.iter_mut().zip(values) {
+            if !value.is_finite() {
+                return Err(ExrError::NotFinite { channel: name, value });
+            }
+            pixel[c] = value;
+        }
+    }
+    Ok(plane)
+}
+
+/// A picture: means, ZIP, linear Rec.709, with its error and layers as named channels.
+pub fn write_picture(picture: &Picture, attributes: &PictureAttributes) -> Vec<u8> {
+    let mut planes: Vec<(String, &Plane)> = vec![(String::new(), &picture.planes[0])];
+    planes.extend(picture.error.iter().map(|plane| ("error".to_owned(), plane)));
+    let texts = [
+        ("ovtigre.job", &attributes.job),
+        ("ovtigre.scene", &attributes.scene),
+        ("ovtigre.seed", &attributes.seed.to_string()),
+        ("ovtigre.method", &attributes.method),
+        ("ovtigre.paths", &attributes.paths),
+        ("ovtigre.manifest", &attributes.manifest),
+        ("software", &attributes.software),
+    ];
+    let mut values: Vec<(&str, AttributeValue)> =
+        texts.map(|(name, value)| (name, AttributeValue::Text(text(value)))).to_vec();
+    values.push(("ovtigre.samples", AttributeValue::F32(attributes.samples as f32)));
+    values.push(("samplesPerPixel", AttributeValue::I32(attributes.samples.round() as i32)));
+    values.push(("renderTimeSeconds", AttributeValue::F32(attributes.render_seconds as f32)));
+    let layer =
+        LayerAttributes { capture_date: Some(text(&attributes.capture_date)), ..LayerAttributes::default() };
+    encode(&planes, picture.size, picture.region, values, Encoding::SMALL_LOSSLESS, layer)
+}
+
+fn encode(
+    planes: &[(String, &Plane)],
+    frame: Size,
+    region: Region,
+    attributes: Vec<(&str, AttributeValue)>,
+    encoding: Encoding,
+    mut layer_attributes: LayerAttributes,
+) -> Vec<u8> {
+    let channels = planes.iter().flat_map(|(prefix, plane)| {
+        (0..3).map(move |c| {
+            let samples = FlatSamples::F32(plane.iter().map(|pixel| pixel[c]).collect());
+            AnyChannel::new(text(&channel_name(prefix, c)), samples)
+        })
+    });
+    layer_attributes.layer_position = Vec2(region.x as i32, region.y as i32);
+    let size = Vec2(region.width as usize, region.height as usize);
+    let layer = Layer::new(size, layer_attributes, encoding, AnyChannels::sort(channels.collect()));
+    let mut image = Image::from_layer(layer);
+    let frame = Vec2(frame.width as usize, frame.height as usize);
+    image.attributes.display_window = IntegerBounds::from_dimensions(frame);
+    image.attributes.chromaticities = Some(REC_709);
+    for (name, value) in attributes {
+        image.attributes.other.insert(text(name), value);
+    }
+    let mut bytes = Cursor::new(Vec::new());
+    image.write().non_parallel().to_buffered(&mut bytes).expect("writing an EXR to memory cannot fail");
+    bytes.into_inner()
+}
+
+/// ITU-R BT.709 primaries and D65.
+const REC_709: exr::meta::attribute::Chromaticities = exr::meta::attribute::Chromaticities {
+    red: Vec2(0.64, 0.33),
+    green: Vec2(0.3, 0.6),
+    blue: Vec2(0.15, 0.06),
+    white: Vec2(0.3127, 0.3290),
+};
+
+/// EXR attribute texts are Latin-1; others lose what they cannot say.
+fn text(value: &str) -> Text {
+    Text::new_or_none(value).unwrap_or_else(|| {
+        Text::from(value.chars().map(|c| if c.is_ascii() { c } else { '?' }).collect::<String>().as_str())
+    })
+}
+
+fn invalid_text(invalid: InvalidSamples) -> String {
+    format!("{},{},{}", invalid.nan, invalid.infinite, invalid.negative)
+}
+
+fn invalid_from(text: &str) -> Option<InvalidSamples> {
+    let numbers: Option<Vec<u64>> = text.split(',').map(|n| n.parse().ok()).collect();
+    match *numbers?.as_slice() {
+        [nan, infinite, negative] => Some(InvalidSamples { nan, infinite, negative }),
+        _ => None,
+    }
+}
+
+/// All channels of the first part of any flat EXR as f32.
+pub fn read_layers(bytes: &[u8]) -> Result<Layers, ExrError> {
+    decode(bytes, 1 << 31)
+}
+
+fn decode(bytes: &[u8], values_max: u64) -> Result<Layers, ExrError> {
+    let unreadable = |e: exr::error::Error| ExrError::Unreadable(e.to_string());
+    let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(unreadable)?;
+    for header in &meta.headers {
+        let got = header.layer_size.area() as u64 * header.channels.list.len() as u64;
+        if got > values_max {
+            return Err(ExrError::TooLarge { got, limit: values_max });
+        }
+    }
+    let image = read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .first_valid_layer()
+        .all_attributes()
+        .non_parallel()
+        .from_buffered(Cursor::new(bytes))
+        .map_err(unreadable)?;
+    let layer = image.layer_data;
+    let channels = (layer.channel_data.list.into_iter())
+        .map(|channel| (channel.name.to_string(), channel.sample_data.values_as_f32().collect()))
+        .collect();
+    let texts = image.attributes.other.iter().chain(&layer.attributes.other);
+    let attributes = texts
+        .filter_map(|(name, value)| match value {
+            AttributeValue::Text(text) => Some((name.to_string(), text.to_string())),
+            _ => None,
+        })
+        .collect();
+    Ok(Layers { width: layer.size.0, height: layer.size.1, channels, attributes })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sum() -> Sum {
+        let region = Region { x: 2, y: 1, width: 3, height: 2 };
+        let batch = Batch { region, replicate: 3, block: Block { index: 2, start: 8, count: 8 } };
+        let plane: Plane = (0..6).map(|i| [i as f32, 1e-30, f32::MAX / (1.0 + i as f32)]).collect();
+        let invalid = InvalidSamples { nan: 1, infinite: 2, negative: 3 };
+        Sum { batch, planes: vec![plane.clone(), plane], invalid, rays: 12345 }
+    }
+
+    fn attributes() -> PartialAttributes {
+        PartialAttributes { job: "j".to_owned(), scene: "s".to_owned(), method: "path".to_owned() }
+    }
+
+    #[test]
+    fn a_partial_is_read_as_it_was_written() {
+        let bytes = write_partial(&sum(), Size { width: 8, height: 4 }, &attributes());
+        let (read, says) = read_partial(&bytes, 6).unwrap();
+        assert_eq!((read, says), (sum(), attributes()));
+    }
+
+    #[test]
+    fn damaged_partials_are_refused() {
+        let bytes = write_partial(&sum(), Size { width: 8, height: 4 }, &attributes());
+        for end in 0..bytes.len() - 1 {
+            assert!(read_partial(&bytes[..end], 6).is_err(), "cut at {end} of {}", bytes.len());
+        }
+        assert!(matches!(read_partial(&bytes, 0), Err(ExrError::TooLarge { .. })));
+        let mut nan = sum();
+        nan.planes[1][4][2] = f32::NAN;
+        let bytes = write_partial(&nan, Size { width: 8, height: 4 }, &attributes());
+        assert!(matches!(read_partial(&bytes, 6), Err(ExrError::NotFinite { .. })));
+    }
+}

@@ -101,7 +101,9 @@ impl FromStr for Region {
         let numbers: Option<Vec<u32>> = text.split(',').map(|n| n.trim().parse().ok()).collect();
         match numbers.as_deref() {
             Some(&[x, y, width, height]) if width > 0 && height > 0 => Ok(Self { x, y, width, height }),
-            _ => Err(format!("'{text}' is not a region: write X,Y,WIDTH,HEIGHT in pixels, such as 0,0,640,360")),
+            _ => Err(format!(
+                "'{text}' is not a region: write X,Y,WIDTH,HEIGHT in pixels, such as 0,0,640,360"
+            )),
         }
     }
 }

@@ -29,7 +29,8 @@ impl AliasTable {
         let mut slots: Vec<Slot> = (weights.iter().enumerate())
             .map(|(i, w)| Slot { keep: 1.0, alias: i as u32, probability: (w / total) as f32 })
             .collect();
-        let (mut small, mut large): (Vec<usize>, Vec<usize>) = (0..weights.len()).partition(|&i| scaled[i] < 1.0);
+        let (mut small, mut large): (Vec<usize>, Vec<usize>) =
+            (0..weights.len()).partition(|&i| scaled[i] < 1.0);
         while let (Some(&s), Some(&l)) = (small.last(), large.last()) {
             small.pop();
             slots[s].keep = scaled[s] as f32;

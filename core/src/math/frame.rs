@@ -54,7 +54,9 @@ mod tests {
 
     #[test]
     fn frames_are_orthonormal_and_right_handed() {
-        for z in [Vec3::Z, -Vec3::Z, Vec3::X, Vec3::new(0.6, -0.0, -0.8), Vec3::new(1e-4, 0.0, -1.0).normalize()] {
+        for z in
+            [Vec3::Z, -Vec3::Z, Vec3::X, Vec3::new(0.6, -0.0, -0.8), Vec3::new(1e-4, 0.0, -1.0).normalize()]
+        {
             for frame in [Frame::around(z), Frame::with_tangent(z, Vec3::new(0.3, 0.4, 0.5))] {
                 assert!((frame.x.cross(frame.y) - frame.z).length() < 1e-6, "{frame:?}");
                 assert!((frame.x.length() - 1.0).abs() < 1e-6 && (frame.y.length() - 1.0).abs() < 1e-6);

@@ -3,5 +3,7 @@
 pub mod choice;
 pub mod colour;
 pub mod frame;
+pub mod quantile;
 pub mod robust;
+pub mod spherical_triangle;
 pub mod warp;

@@ -1,0 +1,63 @@
+//! Everything a file says about a scene.
+
+use crate::scene::bounds::Bounds;
+use crate::scene::camera::Camera;
+use crate::scene::instance::Instance;
+use crate::scene::material::Material;
+use crate::scene::mesh::Mesh;
+use crate::scene::normalisation::Normalisation;
+use crate::scene::punctual::Punctual;
+use crate::scene::texture::Texture;
+
+/// Everything a file says about a scene, in the scene's space. Indices between the lists are in range.
+#[derive(Clone, Debug)]
+pub struct SceneData {
+    /// Triangles. What stands in one place only is gathered in the first mesh, vertices in the scene's space.
+    pub meshes: Vec<Mesh>,
+    /// Every mesh at every place; [`World`](crate::scene::instance::Placement::World) for the gathered one.
+    pub instances: Vec<Instance>,
+    /// Materials that triangles have.
+    pub materials: Vec<Material>,
+    /// Textures that materials look at.
+    pub textures: Vec<Texture>,
+    /// Cameras in the file's order of nodes; may be empty.
+    pub cameras: Vec<Camera>,
+    /// Lights without extent.
+    pub punctual: Vec<Punctual>,
+    /// A box around all geometry, in the scene's space.
+    pub bounds: Bounds,
+    /// From the file's space to the scene's.
+    pub normalisation: Normalisation,
+}
+
+impl SceneData {
+    /// A scene without anything in it.
+    pub fn empty() -> Self {
+        Self {
+            meshes: Vec::new(),
+            instances: Vec::new(),
+            materials: Vec::new(),
+            textures: Vec::new(),
+            cameras: Vec::new(),
+            punctual: Vec::new(),
+            bounds: Bounds::EMPTY,
+            normalisation: Normalisation::IDENTITY,
+        }
+    }
+
+    /// Name of the node that a triangle of an instance comes from; may be empty.
+    pub fn node_name(&self, instance: u32, triangle: u32) -> &str {
+        let instance = &self.instances[instance as usize];
+        if instance.name.is_empty() {
+            self.meshes[instance.mesh.index()].part_name(triangle)
+        } else {
+            &instance.name
+        }
+    }
+
+    /// The material of a triangle of an instance.
+    pub fn material(&self, instance: u32, triangle: u32) -> &Material {
+        let mesh = &self.meshes[self.instances[instance as usize].mesh.index()];
+        &self.materials[mesh.materials[triangle as usize].index()]
+    }
+}

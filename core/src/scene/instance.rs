@@ -1,0 +1,143 @@
+//! A mesh at a place.
+
+use crate::scene::mesh::MeshId;
+use glam::{Affine3A, DAffine3, DMat3, Mat3A, Vec3};
+
+/// A mesh at a place.
+#[derive(Clone, Debug)]
+pub struct Instance {
+    /// The mesh.
+    pub mesh: MeshId,
+    /// Name of the node; empty where the mesh's parts have names of their own.
+    pub name: String,
+    /// Where it stands.
+    pub placement: Placement,
+}
+
+/// Where an instance stands.
+#[derive(Clone, Copy, Debug)]
+pub enum Placement {
+    /// The mesh's vertices are the scene's already.
+    World,
+    /// The mesh is moved into the scene.
+    Moved(Moved),
+}
+
+/// An invertible transform and what follows from it.
+#[derive(Clone, Copy, Debug)]
+pub struct Moved {
+    /// Mesh to scene.
+    pub to_world: Affine3A,
+    /// Normals of the mesh to normals of the scene, of any length: the cofactors with the determinant's sign.
+    pub normal_to_world: Mat3A,
+    /// Whether the transform mirrors.
+    pub handedness: Handedness,
+}
+
+/// Whether a transform mirrors.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Handedness {
+    /// Positive determinant.
+    Kept,
+    /// Negative determinant: a front face winds clockwise, bitangents change sign.
+    Mirrored,
+}
+
+impl Handedness {
+    /// Of a matrix.
+    pub fn of(matrix: &DMat3) -> Self {
+        if matrix.determinant() < 0.0 { Self::Mirrored } else { Self::Kept }
+    }
+
+    /// 1 or −1.
+    #[inline]
+    pub fn sign(self) -> f32 {
+        match self {
+            Self::Kept => 1.0,
+            Self::Mirrored => -1.0,
+        }
+    }
+}
+
+/// The matrix that takes normals along: the inverse transpose times |det|, which also exists where a
+/// matrix flattens space.
+pub fn normal_matrix(matrix: &DMat3) -> DMat3 {
+    let (x, y, z) = (matrix.x_axis, matrix.y_axis, matrix.z_axis);
+    let sign = if matrix.determinant() < 0.0 { -1.0 } else { 1.0 };
+    DMat3::from_cols(y.cross(z) * sign, z.cross(x) * sign, x.cross(y) * sign)
+}
+
+impl Moved {
+    /// From a transform; `None` where it cannot be inverted in single precision.
+    pub fn new(to_world: &DAffine3) -> Option<Self> {
+        let matrix = to_world.matrix3;
+        let inverse = matrix.inverse();
+        let rounded = Affine3A {
+            matrix3: Mat3A::from_cols(
+                matrix.x_axis.as_vec3a(),
+                matrix.y_axis.as_vec3a(),
+                matrix.z_axis.as_vec3a(),
+            ),
+            translation: to_world.translation.as_vec3a(),
+        };
+        let usable = matrix.determinant() != 0.0
+            && inverse.is_finite()
+            && inverse.as_mat3().is_finite()
+            && rounded.is_finite()
+            && rounded.inverse().is_finite();
+        let normals = normal_matrix(&matrix);
+        let longest = normals.x_axis.length().max(normals.y_axis.length()).max(normals.z_axis.length());
+        let normals = normals * (1.0 / longest);
+        usable.then(|| Self {
+            to_world: rounded,
+            normal_to_world: Mat3A::from(normals.as_mat3()),
+            handedness: Handedness::of(&matrix),
+        })
+    }
+}
+
+impl Placement {
+    /// Mesh to scene.
+    pub fn to_world(&self) -> Affine3A {
+        match self {
+            Self::World => Affine3A::IDENTITY,
+            Self::Moved(moved) => moved.to_world,
+        }
+    }
+
+    /// A normal of the mesh in the scene, of unit length; zero where it vanishes.
+    #[inline]
+    pub fn normal(&self, normal: Vec3) -> Vec3 {
+        match self {
+            Self::World => normal,
+            Self::Moved(moved) => (moved.normal_to_world * normal).normalize_or_zero(),
+        }
+    }
+
+    /// A direction of the mesh in the scene; its length changes with the scale.
+    #[inline]
+    pub fn direction(&self, direction: Vec3) -> Vec3 {
+        match self {
+            Self::World => direction,
+            Self::Moved(moved) => moved.to_world.transform_vector3(direction),
+        }
+    }
+
+    /// A point of the mesh in the scene.
+    #[inline]
+    pub fn point(&self, point: Vec3) -> Vec3 {
+        match self {
+            Self::World => point,
+            Self::Moved(moved) => moved.to_world.transform_point3(point),
+        }
+    }
+
+    /// Whether the front of a triangle winds the other way round.
+    #[inline]
+    pub fn handedness(&self) -> Handedness {
+        match self {
+            Self::World => Handedness::Kept,
+            Self::Moved(moved) => moved.handedness,
+        }
+    }
+}

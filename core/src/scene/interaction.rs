@@ -1,0 +1,205 @@
+//! A point on a surface, ready to be shaded.
+
+use crate::bsdf::surface::SurfaceParameters;
+use crate::math::colour::Rgb;
+use crate::math::frame::Frame;
+use crate::math::robust::gamma;
+use crate::scene::data::SceneData;
+use crate::scene::instance::{Handedness, Placement};
+use crate::scene::material::{Material, Sides, SurfaceCoordinates};
+use crate::scene::mesh::Mesh;
+use crate::scene::texture::Texture;
+use glam::{Vec2, Vec3, Vec4};
+
+/// A side of a surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// Where its corners run counter-clockwise.
+    Front,
+    /// The other.
+    Back,
+}
+
+/// A point on a surface, ready to be shaded.
+#[derive(Clone, Copy, Debug)]
+pub struct Interaction<'a> {
+    /// Where, in the scene's space.
+    pub position: Vec3,
+    /// Bound on the error of `position`, by axis.
+    pub error: Vec3,
+    /// Unit geometric normal, on the front side.
+    pub ng: Vec3,
+    /// Shading frame; its `z` is the interpolated and mapped normal, on the front side too.
+    pub shading: Frame,
+    /// Where on its textures.
+    pub at: SurfaceCoordinates,
+    /// The material.
+    pub material: &'a Material,
+    textures: &'a [Texture],
+}
+
+impl SceneData {
+    /// Corners of a triangle of an instance, in the scene's space, counter-clockwise seen from the front.
+    pub fn corners(&self, instance: u32, triangle: u32) -> [Vec3; 3] {
+        let instance = &self.instances[instance as usize];
+        let [a, b, c] = self.meshes[instance.mesh.index()].corners(triangle).map(|p| instance.placement.point(p));
+        match instance.placement.handedness() {
+            Handedness::Kept => [a, b, c],
+            Handedness::Mirrored => [a, c, b],
+        }
+    }
+
+    /// Share of what is behind that a triangle covers at a point; `barycentric` holds the weights of the
+    /// second and the third corner (in the mesh's order).
+    pub fn alpha(&self, instance: u32, triangle: u32, barycentric: Vec2) -> f32 {
+        let mesh = &self.meshes[self.instances[instance as usize].mesh.index()];
+        let material = &self.materials[mesh.materials[triangle as usize].index()];
+        material.alpha(&self.textures, &coordinates(mesh, triangle, weights(barycentric)))
+    }
+
+    /// The point of a triangle with the given weights of its second and third corner (in the mesh's order).
+    pub fn interaction(&self, instance: u32, triangle: u32, barycentric: Vec2) -> Interaction<'_> {
+        let instance = &self.instances[instance as usize];
+        let mesh = &self.meshes[instance.mesh.index()];
+        let material = &self.materials[mesh.materials[triangle as usize].index()];
+        let weights = weights(barycentric);
+        let corners = mesh.corners(triangle);
+        let (position, error) = place(&instance.placement, corners, weights);
+        let ng = geometric_normal(&instance.placement, corners);
+        let at = coordinates(mesh, triangle, weights);
+        let shading = shading_frame(mesh, triangle, weights, &instance.placement, ng, || {
+            material.mapped_normal(&self.textures, &at)
+        });
+        Interaction { position, error, ng, shading, at, material, textures: &self.textures }
+    }
+}
+
+#[inline]
+fn weights(barycentric: Vec2) -> Vec3 {
+    Vec3::new(1.0 - barycentric.x - barycentric.y, barycentric.x, barycentric.y)
+}
+
+#[inline]
+fn mix<T: Copy + std::ops::Mul<f32, Output = T> + std::ops::Add<Output = T>>(v: [T; 3], w: Vec3) -> T {
+    v[0] * w.x + v[1] * w.y + v[2] * w.z
+}
+
+/// Point and error bound: γ₇ Σ|bᵢvᵢ| for the combination; a transform adds its own rounding and carries
+/// the error through (pbrt §6.8).
+fn place(placement: &Placement, corners: [Vec3; 3], weights: Vec3) -> (Vec3, Vec3) {
+    let position = mix(corners, weights);
+    let magnitude = mix(corners.map(Vec3::abs), weights.abs());
+    let error = magnitude * gamma(7.0);
+    match placement {
+        Placement::World => (position, error),
+        Placement::Moved(moved) => {
+            let m = moved.to_world.matrix3;
+            let absolute =
+                |v: Vec3| Vec3::from(m.x_axis.abs() * v.x + m.y_axis.abs() * v.y + m.z_axis.abs() * v.z);
+            let translation = Vec3::from(moved.to_world.translation).abs();
+            let rounding = (absolute(position.abs()) + translation) * gamma(3.0);
+            (moved.to_world.transform_point3(position), absolute(error) * (1.0 + gamma(3.0)) + rounding)
+        }
+    }
+}
+
+/// Unit normal by winding, from differences taken in double precision: slivers keep theirs.
+fn geometric_normal(placement: &Placement, corners: [Vec3; 3]) -> Vec3 {
+    let [a, b, c] = corners.map(Vec3::as_dvec3);
+    let normal = (b - a).cross(c - a).normalize_or_zero().as_vec3();
+    placement.normal(normal)
+}
+
+fn coordinates(mesh: &Mesh, triangle: u32, weights: Vec3) -> SurfaceCoordinates {
+    let corners = mesh.triangles[triangle as usize].map(|v| v as usize);
+    let uv = |list: &Vec<Vec2>| if list.is_empty() { Vec2::ZERO } else { mix(corners.map(|v| list[v]), weights) };
+    let colour =
+        if mesh.colours.is_empty() { Vec4::ONE } else { mix(corners.map(|v| mesh.colours[v]), weights) };
+    SurfaceCoordinates { uvs: [uv(&mesh.uvs[0]), uv(&mesh.uvs[1])], colour }
+}
+
+/// Interpolated normal, then the normal map in the frame of tangent and bitangent. What vanishes on the
+/// way falls back to the step before; a normal on the back side is turned to the front.
+fn shading_frame(
+    mesh: &Mesh,
+    triangle: u32,
+    weights: Vec3,
+    placement: &Placement,
+    ng: Vec3,
+    map: impl FnOnce() -> Option<Vec3>,
+) -> Frame {
+    let corners = mesh.triangles[triangle as usize].map(|v| v as usize);
+    let mut normal = ng;
+    if !mesh.normals.is_empty() {
+        let smooth = placement.normal(mix(corners.map(|v| mesh.normals[v]), weights));
+        normal = front(smooth.try_normalize().unwrap_or(ng), ng);
+    }
+    if mesh.tangents.is_empty() {
+        return Frame::around(normal);
+    }
+    let mixed = mix(corners.map(|v| mesh.tangents[v]), weights);
+    if mixed.truncate() == Vec3::ZERO {
+        return Frame::around(normal);
+    }
+    let frame = Frame::with_tangent(normal, placement.direction(mixed.truncate()));
+    let Some(mapped) = map() else {
+        return frame;
+    };
+    let sign = 1.0_f32.copysign(mixed.w) * placement.handedness().sign();
+    let bent = frame.x * mapped.x + frame.y * (mapped.y * sign) + frame.z * mapped.z;
+    match bent.try_normalize() {
+        Some(bent) if bent.dot(ng) > 0.0 => Frame::with_tangent(bent, frame.x),
+        _ => frame,
+    }
+}
+
+/// `normal` turned to the side of `ng`; `ng` itself where it lies in the surface.
+#[inline]
+fn front(normal: Vec3, ng: Vec3) -> Vec3 {
+    let cos = normal.dot(ng);
+    if cos > 0.0 {
+        normal
+    } else if cos < 0.0 {
+        -normal
+    } else {
+        ng
+    }
+}
+
+impl Interaction<'_> {
+    /// The side that a direction away from the surface leaves on.
+    #[inline]
+    pub fn side(&self, direction: Vec3) -> Side {
+        if direction.dot(self.ng) < 0.0 { Side::Back } else { Side::Front }
+    }
+
+    /// Radiance emitted on a side, W/(sr·m²).
+    pub fn emission(&self, side: Side) -> Rgb {
+        match (side, self.material.sides) {
+            (Side::Back, Sides::Front) => Vec3::ZERO,
+            _ => self.material.radiance(self.textures, &self.at),
+        }
+    }
+
+    /// Share of what is behind that the surface covers.
+    pub fn alpha(&self) -> f32 {
+        self.material.alpha(self.textures, &self.at)
+    }
+
+    /// What the surface is made of here.
+    pub fn surface(&self) -> SurfaceParameters {
+        let (material, textures, at) = (self.material, self.textures, &self.at);
+        let (roughness, metallic) = material.roughness_and_metallic(textures, at);
+        let (specular, specular_color) = material.dielectric(textures, at);
+        SurfaceParameters {
+            base_color: material.base(textures, at).truncate().clamp(Vec3::ZERO, Vec3::ONE),
+            metallic,
+            roughness,
+            specular,
+            specular_color,
+            ior: material.ior,
+            transmission: material.transmitted(textures, at),
+            walls: material.walls(),
+        }
+    }
+}

@@ -1,0 +1,236 @@
+//! What surfaces are made of.
+
+use crate::bsdf::surface::Walls;
+use crate::math::colour::Rgb;
+use crate::scene::texture::{Texture, TextureId};
+use glam::{Affine2, Vec2, Vec3, Vec4};
+
+/// Index of a material of the scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct MaterialId(pub u16);
+
+impl MaterialId {
+    /// As an index.
+    #[inline]
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+/// Which of a mesh's two lists of texture coordinates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum UvSet {
+    /// The first list.
+    First,
+    /// The second list.
+    Second,
+}
+
+/// A texture and where on it a surface lies.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TextureSlot {
+    /// The texture.
+    pub texture: TextureId,
+    /// The coordinates it is laid out by.
+    pub set: UvSet,
+    /// Applied to them first (`KHR_texture_transform`).
+    pub transform: Affine2,
+}
+
+/// How a surface covers what is behind it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Coverage {
+    /// Wholly.
+    Opaque,
+    /// Where alpha is at least `cutoff`.
+    Mask {
+        /// Alpha from which on the surface is there.
+        cutoff: f32,
+    },
+    /// To the share that alpha says.
+    Blend,
+}
+
+/// Which sides emit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sides {
+    /// The front only.
+    Front,
+    /// Both.
+    Both,
+}
+
+/// A factor and a texture to multiply it with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Textured<T> {
+    /// The factor.
+    pub factor: T,
+    /// The texture.
+    pub texture: Option<TextureSlot>,
+}
+
+impl<T> Textured<T> {
+    /// Without a texture.
+    pub const fn constant(factor: T) -> Self {
+        Self { factor, texture: None }
+    }
+}
+
+/// What a surface is made of: glTF's core model with its specular, ior, transmission, volume and
+/// emissive-strength extensions.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Material {
+    /// Its name; may be empty.
+    pub name: String,
+    /// Reflectance and alpha.
+    pub base_color: Textured<Vec4>,
+    /// 0 dielectric, 1 metal.
+    pub metallic: f32,
+    /// Perceptual roughness.
+    pub roughness: f32,
+    /// Factors of roughness (green) and metallic (blue).
+    pub metallic_roughness: Option<TextureSlot>,
+    /// A normal map and the scale of its x and y.
+    pub normal: Option<(TextureSlot, f32)>,
+    /// Radiance, W/(sr·m²) a channel.
+    pub emission: Textured<Rgb>,
+    /// Which sides emit.
+    pub sides: Sides,
+    /// Strength of the dielectric reflection; its texture's alpha.
+    pub specular: Textured<f32>,
+    /// Colour of the dielectric reflection at normal incidence.
+    pub specular_color: Textured<Rgb>,
+    /// Refractive index, at least 1.
+    pub ior: f32,
+    /// Share of the base that transmits; its texture's red.
+    pub transmission: Textured<f32>,
+    /// What it encloses; `None` for thin walls.
+    pub volume: Option<Volume>,
+    /// How it covers what is behind it.
+    pub coverage: Coverage,
+}
+
+/// A solid's inside.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Volume {
+    /// Absorption coefficient, per scene unit: light fades with exp(−absorption · distance).
+    pub absorption: Rgb,
+}
+
+impl Default for Material {
+    /// glTF's default material: white, metallic, rough.
+    fn default() -> Self {
+        Self {
+            name: String::new(),
+            base_color: Textured::constant(Vec4::ONE),
+            metallic: 1.0,
+            roughness: 1.0,
+            metallic_roughness: None,
+            normal: None,
+            emission: Textured::constant(Vec3::ZERO),
+            sides: Sides::Front,
+            specular: Textured::constant(1.0),
+            specular_color: Textured::constant(Vec3::ONE),
+            ior: 1.5,
+            transmission: Textured::constant(0.0),
+            volume: None,
+            coverage: Coverage::Opaque,
+        }
+    }
+}
+
+/// Where on its textures a point lies, and the colour of the mesh there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfaceCoordinates {
+    /// Both sets of texture coordinates.
+    pub uvs: [Vec2; 2],
+    /// Vertex colour and alpha, linear.
+    pub colour: Vec4,
+}
+
+impl TextureSlot {
+    /// The texture's value at a point.
+    #[inline]
+    pub fn sample(&self, textures: &[Texture], at: &SurfaceCoordinates) -> Vec4 {
+        let uv = at.uvs[self.set as usize];
+        textures[self.texture.index()].sample(self.transform.transform_point2(uv))
+    }
+}
+
+impl Material {
+    /// Thin-walled, or the surface of a solid.
+    pub fn walls(&self) -> Walls {
+        if self.volume.is_some() { Walls::Solid } else { Walls::Thin }
+    }
+
+    /// Whether it emits anywhere.
+    pub fn emits(&self) -> bool {
+        self.emission.factor.max_element() > 0.0
+    }
+
+    /// All texture slots that are in use.
+    pub fn slots(&self) -> impl Iterator<Item = &TextureSlot> {
+        [
+            self.base_color.texture.as_ref(),
+            self.metallic_roughness.as_ref(),
+            self.normal.as_ref().map(|(slot, _)| slot),
+            self.emission.texture.as_ref(),
+            self.specular.texture.as_ref(),
+            self.specular_color.texture.as_ref(),
+            self.transmission.texture.as_ref(),
+        ]
+        .into_iter()
+        .flatten()
+    }
+
+    /// Base colour and alpha before the coverage rule.
+    pub fn base(&self, textures: &[Texture], at: &SurfaceCoordinates) -> Vec4 {
+        let texel = self.base_color.texture.map_or(Vec4::ONE, |slot| slot.sample(textures, at));
+        self.base_color.factor * at.colour * texel
+    }
+
+    /// Share of what is behind that the surface covers, 0..1: 1 for opaque ones, 0 or 1 for masks.
+    pub fn alpha(&self, textures: &[Texture], at: &SurfaceCoordinates) -> f32 {
+        match self.coverage {
+            Coverage::Opaque => 1.0,
+            Coverage::Mask { cutoff } => f32::from(self.base(textures, at).w >= cutoff),
+            Coverage::Blend => self.base(textures, at).w.clamp(0.0, 1.0),
+        }
+    }
+
+    /// Radiance emitted where a side emits.
+    pub fn radiance(&self, textures: &[Texture], at: &SurfaceCoordinates) -> Rgb {
+        match self.emission.texture {
+            Some(slot) if self.emits() => {
+                self.emission.factor * slot.sample(textures, at).truncate().max(Vec3::ZERO)
+            }
+            _ => self.emission.factor,
+        }
+    }
+
+    /// Roughness and metallic.
+    pub fn roughness_and_metallic(&self, textures: &[Texture], at: &SurfaceCoordinates) -> (f32, f32) {
+        let texel = self.metallic_roughness.map_or(Vec4::ONE, |slot| slot.sample(textures, at));
+        ((self.roughness * texel.y).clamp(0.0, 1.0), (self.metallic * texel.z).clamp(0.0, 1.0))
+    }
+
+    /// Strength and colour of the dielectric reflection.
+    pub fn dielectric(&self, textures: &[Texture], at: &SurfaceCoordinates) -> (f32, Rgb) {
+        let strength = self.specular.texture.map_or(1.0, |slot| slot.sample(textures, at).w);
+        let colour = self.specular_color.texture.map_or(Vec3::ONE, |slot| slot.sample(textures, at).truncate());
+        ((self.specular.factor * strength).clamp(0.0, 1.0), self.specular_color.factor * colour)
+    }
+
+    /// Share of the base that transmits.
+    pub fn transmitted(&self, textures: &[Texture], at: &SurfaceCoordinates) -> f32 {
+        let texel = self.transmission.texture.map_or(1.0, |slot| slot.sample(textures, at).x);
+        (self.transmission.factor * texel).clamp(0.0, 1.0)
+    }
+
+    /// The normal that the map says, in the frame of tangent, bitangent and normal; not of unit length.
+    pub fn mapped_normal(&self, textures: &[Texture], at: &SurfaceCoordinates) -> Option<Vec3> {
+        let (slot, scale) = self.normal?;
+        let n = slot.sample(textures, at).truncate() * 2.0 - Vec3::ONE;
+        Some(Vec3::new(n.x * scale, n.y * scale, n.z))
+    }
+}
