@@ -50,7 +50,7 @@ impl Answer {
         while let Some(piece) = self.piece().await? {
             if whole.len() + piece.len() > limit {
                 let reason = format!("it is longer than {limit} bytes");
-                return Err(ClientError::Unexpected { call: self.name, reason });
+                return Err(ClientError::Unexpected { call: self.name, status: None, reason });
             }
             whole.extend_from_slice(&piece);
         }
@@ -61,8 +61,10 @@ impl Answer {
     pub async fn json<T: DeserializeOwned>(self) -> Result<T, ClientError> {
         let call = self.name.clone();
         let bytes = self.bytes(DOCUMENT_MAX).await?;
-        serde_json::from_slice(&bytes)
-            .map_err(|e| ClientError::Unexpected { call, reason: format!("not the document expected: {e}") })
+        serde_json::from_slice(&bytes).map_err(|e| {
+            let reason = format!("not the document expected: {e}");
+            ClientError::Unexpected { call, status: None, reason }
+        })
     }
 }
 
@@ -83,5 +85,6 @@ pub(super) async fn problem(response: Response, name: String) -> ClientError {
     }
     let text: String = String::from_utf8_lossy(&body).chars().take(200).collect();
     let line = text.split_whitespace().collect::<Vec<_>>().join(" ");
-    ClientError::Unexpected { call: name, reason: format!("{status} {line}").trim().to_owned() }
+    let reason = format!("{status} {line}").trim().to_owned();
+    ClientError::Unexpected { call: name, status: Some(status.as_u16()), reason }
 }

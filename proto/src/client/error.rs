@@ -22,6 +22,8 @@ pub enum ClientError {
     Unexpected {
         /// Method and address.
         call: String,
+        /// Its HTTP status, where that is what was unexpected.
+        status: Option<u16>,
         /// What is wrong with it.
         reason: String,
     },
@@ -50,10 +52,11 @@ pub enum ClientError {
 }
 
 impl ClientError {
-    /// The HTTP status of the farm's refusal, where it is one.
+    /// The HTTP status of a refusal, where it is one.
     pub fn status(&self) -> Option<u16> {
         match self {
             Self::Problem(problem) => Some(problem.status),
+            Self::Unexpected { status, .. } => *status,
             _ => None,
         }
     }
@@ -62,8 +65,10 @@ impl ClientError {
     pub fn may_pass(&self) -> bool {
         match self {
             Self::Unreachable { .. } | Self::Damaged { .. } => true,
-            Self::Problem(problem) => problem.status == 429 || problem.status >= 500,
-            Self::Unexpected { .. } | Self::Address { .. } | Self::File { .. } => false,
+            Self::Problem(_) | Self::Unexpected { .. } => {
+                self.status().is_some_and(|status| status == 429 || status >= 500)
+            }
+            Self::Address { .. } | Self::File { .. } => false,
         }
     }
 }

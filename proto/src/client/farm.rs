@@ -146,3 +146,95 @@ async fn refusal(response: Response, name: String, repeat: Repeat) -> Failure {
     let again = may_pass && after.is_none_or(|after| after <= RETRY_AFTER_MAX);
     Failure { error: problem(response, name).await, again, after }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{super::mock::serve, *};
+    use crate::problem;
+    use axum::{Router, http::StatusCode, response::IntoResponse, routing::any};
+    use reqwest::Method;
+    use std::time::Instant;
+
+    /// A farm that answers its n-th call with the n-th of `answers`, and then with success.
+    async fn farm(answers: &'static [(u16, &'static str)]) -> (Client, Arc<AtomicU64>) {
+        let calls = Arc::new(AtomicU64::new(0));
+        let counted = calls.clone();
+        let answer = move || {
+            let n = counted.fetch_add(1, Ordering::SeqCst) as usize;
+            async move {
+                let (status, retry_after) = answers.get(n).copied().unwrap_or((200, ""));
+                let mut response = (StatusCode::from_u16(status).unwrap(), "{}").into_response();
+                if !retry_after.is_empty() {
+                    response.headers_mut().insert("retry-after", retry_after.parse().unwrap());
+                }
+                response
+            }
+        };
+        (serve(Router::new().fallback(any(answer))).await, calls)
+    }
+
+    #[tokio::test]
+    async fn what_may_pass_is_tried_again_and_what_counts_is_not() {
+        let get = Call::new(Method::GET, "/");
+        let post = Call::new(Method::POST, "/");
+        for (call, answers, succeeds, calls_made) in [
+            (&get, &[(503, ""), (502, ""), (504, "")][..], true, 4),
+            (&get, &[(500, "")], false, 1),
+            (&get, &[(404, "")], false, 1),
+            (&post, &[(502, "")], false, 1),
+            (&post, &[(503, ""), (429, "")], true, 3),
+            (&get, &[(503, "3600")], false, 1),
+        ] {
+            let (client, calls) = farm(answers.to_vec().leak()).await;
+            assert_eq!(client.send(call).await.is_ok(), succeeds, "{answers:?}");
+            assert_eq!(calls.load(Ordering::SeqCst), calls_made, "{answers:?}");
+        }
+    }
+
+    #[tokio::test]
+    async fn a_farm_is_given_the_time_it_asks_for() {
+        let (client, _) = farm(&[(429, "1")]).await;
+        let start = Instant::now();
+        client.send(&Call::new(Method::POST, "/")).await.unwrap();
+        assert!(start.elapsed() >= Duration::from_secs(1));
+    }
+
+    #[tokio::test]
+    async fn nobody_there_is_said_so() {
+        let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
+        let address = listener.local_addr().unwrap();
+        drop(listener);
+        let client = Client::new(&address.to_string(), 1).unwrap().with_attempts(2);
+        let error = client.send(&Call::new(Method::POST, "/")).await.unwrap_err();
+        assert!(matches!(error, ClientError::Unreachable { .. }) && error.may_pass(), "{error}");
+    }
+
+    #[tokio::test]
+    async fn a_broken_connection_is_tried_again_only_where_that_is_harmless() {
+        let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
+        let client = Client::new(&listener.local_addr().unwrap().to_string(), 1).unwrap().with_attempts(3);
+        let connections = Arc::new(AtomicU64::new(0));
+        let counted = connections.clone();
+        tokio::spawn(async move {
+            while let Ok((socket, _)) = listener.accept().await {
+                counted.fetch_add(1, Ordering::SeqCst);
+                socket.readable().await.unwrap();
+            }
+        });
+        assert!(client.send(&Call::new(Method::POST, "/")).await.is_err());
+        assert_eq!(connections.swap(0, Ordering::SeqCst), 1);
+        assert!(client.send(&Call::new(Method::GET, "/")).await.is_err());
+        assert_eq!(connections.load(Ordering::SeqCst), 3);
+    }
+
+    #[tokio::test]
+    async fn a_problem_document_is_a_typed_error() {
+        let document = r#"{"type":"/problems/invalid-job","title":"x","status":422,"detail":"samples is 0"}"#;
+        let answer = move || async move {
+            (StatusCode::UNPROCESSABLE_ENTITY, [("content-type", problem::MEDIA_TYPE)], document)
+        };
+        let client = serve(Router::new().fallback(any(answer))).await;
+        let error = client.send(&Call::new(Method::GET, "/")).await.unwrap_err();
+        assert_eq!((error.status(), error.to_string().as_str()), (Some(422), "samples is 0"));
+    }
+}

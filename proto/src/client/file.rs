@@ -81,3 +81,24 @@ impl Answer {
 fn failed(path: &Path, error: &std::io::Error) -> ClientError {
     ClientError::File { path: path.to_owned(), reason: error.to_string() }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{super::mock::serve, *};
+    use axum::{Router, routing::get};
+
+    #[tokio::test]
+    async fn bytes_of_another_hash_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scene");
+        tokio::fs::write(&path, b"scene").await.unwrap();
+        let upload = Upload::file(path.clone()).await.unwrap();
+        assert_eq!(upload.id(), Upload::bytes("scene").id());
+        for (sent, arrives) in [("scene", true), ("scent", false), ("", false)] {
+            let route = get(move || async move { sent });
+            let client = serve(Router::new().route("/v1/scenes/{id}/bytes", route)).await;
+            let saved = client.scene_bytes(upload.id()).await.unwrap().save_checked(&path, upload.id()).await;
+            assert_eq!(saved.is_ok(), arrives, "{saved:?}");
+        }
+    }
+}

@@ -13,3 +13,6 @@ pub mod pages;
 pub mod scenes;
 pub mod sse;
 pub mod workers;
+
+#[cfg(test)]
+mod mock;
