@@ -1,3 +1,4 @@
 //! All integration tests, one binary.
-#[test]
-fn builds() {}
+
+mod closed_forms;
+mod same_bits;

@@ -1,1 +1,5 @@
-//! What the tests share.
+//! What the tests share: scenes made by code, and renders of them without a farm.
+
+pub mod glb;
+pub mod picture;
+pub mod scenes;

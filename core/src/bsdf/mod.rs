@@ -1,4 +1,179 @@
 //! One file a lobe, and the enum of what a surface does to light.
+//!
+//! Directions are unit vectors in the shading frame, z the shading normal on the front side, and point away
+//! from the surface. Densities are over solid angle. Surfaces scatter on both sides. Every lobe is reciprocal
+//! (refraction: f(o→i) / η² symmetric) and no albedo exceeds one.
 
+pub mod albedo;
+pub mod conductor;
 pub mod event;
+pub mod fresnel;
+pub mod ggx;
+pub mod glass;
+mod gloss;
+pub mod lambert;
+mod lobe;
+pub mod mixture;
+pub mod plastic;
+mod sheet;
+mod solid;
 pub mod surface;
+
+#[cfg(test)]
+mod tests;
+
+use crate::bsdf::conductor::Conductor;
+use crate::bsdf::event::{BsdfSample, Letter, Letters, SampleKind, Scattered, Transport};
+use crate::bsdf::fresnel::{Schlick, dielectric_at_normal};
+use crate::bsdf::glass::Glass;
+use crate::bsdf::lambert::Lambert;
+use crate::bsdf::lobe::{Drawn, Evaluated};
+use crate::bsdf::mixture::Mixture;
+use crate::bsdf::plastic::Plastic;
+use crate::bsdf::surface::SurfaceParameters;
+use crate::math::colour::Rgb;
+use glam::{Vec2, Vec3};
+
+/// A direction with a smaller |cos θ| lies in the surface: products of two still are normal numbers.
+const HORIZON: f32 = 1e-18;
+
+/// What a surface does to light at one point.
+#[derive(Clone, Copy, Debug)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "built at every hit: no heap; only the variant's own part is written"
+)]
+pub enum Bsdf {
+    /// Ideally diffuse.
+    Lambert(Lambert),
+    /// A metal.
+    Conductor(Conductor),
+    /// A reflecting interface over a diffuse base.
+    Plastic(Plastic),
+    /// A reflecting and transmitting interface.
+    Glass(Glass),
+    /// Several of them.
+    Mixture(Mixture),
+}
+
+impl Bsdf {
+    /// metallic · conductor + (1 − metallic) · ((1 − transmission) · plastic + transmission · glass).
+    pub fn from_surface(given: &SurfaceParameters) -> Self {
+        let s = clamped(given);
+        let alpha = s.roughness * s.roughness;
+        let [metal, plastic, glass] =
+            [s.metallic, (1.0 - s.metallic) * (1.0 - s.transmission), (1.0 - s.metallic) * s.transmission];
+        let new_conductor = || Conductor::new(alpha, s.base_color);
+        let new_plastic = || {
+            let f0 = (dielectric_at_normal(s.ior) * s.specular_color).min(Rgb::ONE) * s.specular;
+            Plastic::new(alpha, Schlick { f0, f90: s.specular }, s.base_color)
+        };
+        let new_glass = || Glass::new(&s, alpha);
+        if metal >= 1.0 {
+            Self::Conductor(new_conductor())
+        } else if plastic >= 1.0 && s.specular == 0.0 {
+            Self::Lambert(Lambert { reflectance: s.base_color })
+        } else if plastic >= 1.0 {
+            Self::Plastic(new_plastic())
+        } else if glass >= 1.0 {
+            Self::Glass(new_glass())
+        } else {
+            Self::Mixture(Mixture {
+                conductor: (metal > 0.0).then(|| (metal, new_conductor())),
+                plastic: (plastic > 0.0).then(|| (plastic, new_plastic())),
+                glass: (glass > 0.0).then(|| (glass, new_glass())),
+            })
+        }
+    }
+
+    /// The letters that a scattering here can have.
+    pub fn letters(&self) -> Letters {
+        match self {
+            Self::Lambert(_) => Letters::of(Letter::Diffuse),
+            Self::Conductor(part) => part.letters(),
+            Self::Plastic(part) => part.letters(),
+            Self::Glass(part) => part.letters(),
+            Self::Mixture(part) => part.letters(),
+        }
+    }
+
+    /// Whether a lobe has a finite density, so that connecting to this point can be worth something.
+    pub fn is_smooth_anywhere(&self) -> bool {
+        let letters = self.letters();
+        letters.has(Letter::Diffuse) || letters.has(Letter::Glossy)
+    }
+
+    /// f · |cos θᵢ| by letter, of the smooth lobes; zero where a direction lies in the surface.
+    #[inline]
+    pub fn eval(&self, wo: Vec3, wi: Vec3, transport: Transport) -> Scattered {
+        self.evaluate(wo, wi, transport).value
+    }
+
+    /// The density over solid angle with which [`Self::sample`] draws `wi` given `wo` from the smooth
+    /// lobes, their probabilities included; it integrates to what delta lobes and absorption leave of one.
+    #[inline]
+    pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
+        self.evaluate(wo, wi, Transport::Importance).pdf
+    }
+
+    /// [`Self::eval`] and [`Self::pdf`] for the price of one.
+    #[inline]
+    pub fn eval_and_pdf(&self, wo: Vec3, wi: Vec3, transport: Transport) -> (Scattered, f32) {
+        let evaluated = self.evaluate(wo, wi, transport);
+        (evaluated.value, evaluated.pdf)
+    }
+
+    /// Draws a direction; `u_lobe` and `u` are uniform in 0..1. `None`: absorbed.
+    pub fn sample(&self, wo: Vec3, u_lobe: f32, u: Vec2, transport: Transport) -> Option<BsdfSample> {
+        if wo.z.abs() < HORIZON {
+            return None;
+        }
+        let Drawn { wi, eta, delta } = match self {
+            Self::Lambert(_) => Lambert::draw(wo, u),
+            Self::Conductor(part) => part.draw(wo, u_lobe, u)?,
+            Self::Plastic(part) => part.draw(wo, u_lobe, u)?,
+            Self::Glass(part) => part.draw(wo, u_lobe, u, transport)?,
+            Self::Mixture(part) => part.draw(wo, u_lobe, u, transport)?,
+        };
+        let kind = if let Some(delta) = delta {
+            SampleKind::Specular { weight: delta.value / delta.probability, probability: delta.probability }
+        } else {
+            let Evaluated { value, pdf } = self.evaluate(wo, wi, transport);
+            if !(pdf > 0.0 && pdf.is_finite()) {
+                return None;
+            }
+            SampleKind::Smooth { value, pdf }
+        };
+        Some(BsdfSample { wi, kind, eta })
+    }
+
+    #[inline]
+    fn evaluate(&self, wo: Vec3, wi: Vec3, transport: Transport) -> Evaluated {
+        if wo.z.abs() < HORIZON || wi.z.abs() < HORIZON {
+            return Evaluated::default();
+        }
+        match self {
+            Self::Lambert(part) => part.evaluate(wo, wi),
+            Self::Conductor(part) => part.evaluate(wo, wi),
+            Self::Plastic(part) => part.evaluate(wo, wi),
+            Self::Glass(part) => part.evaluate(wo, wi, transport),
+            Self::Mixture(part) => part.evaluate(wo, wi, transport),
+        }
+    }
+}
+
+/// Every number within its range; not-a-number becomes zero.
+#[expect(clippy::manual_clamp, reason = "clamp keeps what is not a number")]
+fn clamped(s: &SurfaceParameters) -> SurfaceParameters {
+    let unit = |v: f32| v.max(0.0).min(1.0);
+    SurfaceParameters {
+        base_color: Rgb::from_array(s.base_color.to_array().map(unit)),
+        metallic: unit(s.metallic),
+        roughness: unit(s.roughness),
+        specular: unit(s.specular),
+        specular_color: Rgb::from_array(s.specular_color.to_array().map(|v| v.max(0.0).min(f32::MAX))),
+        ior: s.ior.max(0.0).min(f32::MAX),
+        transmission: unit(s.transmission),
+        walls: s.walls,
+    }
+}

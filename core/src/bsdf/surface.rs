@@ -1,33 +1,34 @@
-//! What the glTF surface model is made of at one point.
+//! What a glTF material says at one point.
 
 use crate::math::colour::Rgb;
 
-/// Whether a transmitting surface is a wall without thickness or the border of a solid.
+/// What is behind a transmitting surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Walls {
-    /// Light passes straight through.
+    /// A sheet without thickness: light passes without being bent.
     Thin,
-    /// Light refracts into or out of a solid.
+    /// A solid: the side of −z is inside, and light is refracted.
     Solid,
 }
 
-/// The parameters of the glTF surface model at one point, textures and vertex colours applied.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// A glTF metallic-roughness surface with `KHR_materials_specular`, `_ior`, `_transmission` and
+/// `_volume`, all textures applied. Numbers outside their range are clamped when a BSDF is built.
+#[derive(Clone, Copy, Debug)]
 pub struct SurfaceParameters {
-    /// Reflectance of the base, 0..1.
+    /// Linear Rec.709, in 0..=1.
     pub base_color: Rgb,
     /// 0 dielectric, 1 metal.
     pub metallic: f32,
-    /// Perceptual roughness, 0..1; α is its square.
+    /// Perceptual: α is its square.
     pub roughness: f32,
-    /// Strength of the dielectric reflection, 0..1.
+    /// `specularFactor`, in 0..=1.
     pub specular: f32,
-    /// Colour of the dielectric reflection at normal incidence.
+    /// `specularColorFactor`, not negative.
     pub specular_color: Rgb,
-    /// Refractive index, at least 1.
+    /// Refractive index of the inside over that of the outside; 0 means infinite, as in glTF.
     pub ior: f32,
-    /// Share of the base that transmits, 0..1.
+    /// `transmissionFactor`, in 0..=1.
     pub transmission: f32,
-    /// Thin or solid.
+    /// What transmitted light enters.
     pub walls: Walls,
 }

@@ -50,3 +50,27 @@ pub fn triangle(u: Vec2) -> Vec2 {
         Vec2::new(u.x - y, y)
     }
 }
+
+/// The part of the unit sphere with z above `lowest`, uniformly.
+#[inline]
+pub fn cap(u: Vec2, lowest: f32) -> Vec3 {
+    let z = 1.0 - u.y * (1.0 - lowest);
+    let r = ((1.0 - z) * (1.0 + z)).max(0.0).sqrt();
+    let (sin, cos) = libm::sincosf(core::f32::consts::TAU * u.x);
+    Vec3::new(r * cos, r * sin, z)
+}
+
+/// A direction of the upper hemisphere that favours the horizon: the squared cosine has density
+/// 1 / ((c + cos² θ) ℓ) with ℓ = ln(1 + 1/c), which the caller keeps.
+pub fn horizon_hemisphere(u: Vec2, c: f32, ell: f32) -> Vec3 {
+    let squared = (c * libm::expm1f(u.y * ell)).clamp(0.0, 1.0);
+    let r = (1.0 - squared).sqrt();
+    let (sin, cos) = libm::sincosf(core::f32::consts::TAU * u.x);
+    Vec3::new(r * cos, r * sin, squared.sqrt())
+}
+
+/// Density of [`horizon_hemisphere`] over solid angle; zero below the horizon.
+#[inline]
+pub fn horizon_hemisphere_pdf(cos: f32, c: f32, ell: f32) -> f32 {
+    cos.max(0.0) * FRAC_1_PI / ((c + cos * cos) * ell)
+}

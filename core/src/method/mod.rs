@@ -1,1 +1,3 @@
 //! The ways to estimate light, each short, because `path` does the work.
+
+pub mod path;

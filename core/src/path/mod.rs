@@ -1,1 +1,6 @@
-//! What all methods share: vertices, next event, weights.
+//! What all methods share: vertices, media, next events, walks.
+
+pub mod media;
+pub mod next_event;
+pub mod vertex;
+pub mod walk;

@@ -33,7 +33,8 @@ impl Bounds {
             return moved;
         }
         for corner in 0..8 {
-            let pick = |axis: usize| if corner >> axis & 1 == 0 { self.lower[axis] } else { self.upper[axis] };
+            let pick =
+                |axis: usize| if corner >> axis & 1 == 0 { self.lower[axis] } else { self.upper[axis] };
             moved.include(transform.transform_point3(DVec3::new(pick(0), pick(1), pick(2))));
         }
         moved

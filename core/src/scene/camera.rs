@@ -67,8 +67,11 @@ impl Camera {
     /// scenes without one.
     pub fn framed(bounds: &Bounds) -> Self {
         let tan_half_y = 0.414_213_57_f64; // 45° from bottom to top
-        let (centre, radius) =
-            if bounds.is_empty() { (DVec3::ZERO, 1.0) } else { (bounds.centre(), bounds.radius().max(1e-30)) };
+        let (centre, radius) = if bounds.is_empty() {
+            (DVec3::ZERO, 1.0)
+        } else {
+            (bounds.centre(), bounds.radius().max(1e-30))
+        };
         let backward = DVec3::new(0.45, 0.35, 1.0).normalize();
         let right = DVec3::Y.cross(backward).normalize();
         let up = backward.cross(right);

@@ -217,7 +217,8 @@ impl Material {
     /// Strength and colour of the dielectric reflection.
     pub fn dielectric(&self, textures: &[Texture], at: &SurfaceCoordinates) -> (f32, Rgb) {
         let strength = self.specular.texture.map_or(1.0, |slot| slot.sample(textures, at).w);
-        let colour = self.specular_color.texture.map_or(Vec3::ONE, |slot| slot.sample(textures, at).truncate());
+        let colour =
+            self.specular_color.texture.map_or(Vec3::ONE, |slot| slot.sample(textures, at).truncate());
         ((self.specular.factor * strength).clamp(0.0, 1.0), self.specular_color.factor * colour)
     }
 

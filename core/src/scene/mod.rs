@@ -3,10 +3,91 @@
 pub mod bounds;
 pub mod camera;
 pub mod data;
+pub mod distribution;
+pub mod environment;
 pub mod instance;
 pub mod interaction;
+pub mod light;
+pub mod lights;
 pub mod material;
 pub mod mesh;
 pub mod normalisation;
 pub mod punctual;
 pub mod texture;
+pub mod view;
+
+use crate::sampler::decide;
+use crate::scene::data::SceneData;
+use crate::scene::environment::Environment;
+use crate::scene::lights::Lights;
+use crate::scene::material::Coverage;
+use crate::scene::view::View;
+use crate::trace::aggregate::Aggregate;
+use crate::trace::build_error::BuildError;
+use crate::trace::instance::Placement;
+use crate::trace::mesh::MeshTree;
+use crate::trace::ray::{Hit, Ray};
+use rayon::prelude::*;
+
+/// A scene that is ready to be rendered: its trees are built, its lights are gathered.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// What the file says.
+    pub data: SceneData,
+    /// Light from infinitely far.
+    pub environment: Option<Environment>,
+    /// What next events are made to.
+    pub lights: Lights,
+    /// From where it is seen.
+    pub view: View,
+    aggregate: Aggregate,
+    coverage: SceneCoverage,
+}
+
+/// Whether anything in a scene can be looked through.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum SceneCoverage {
+    Opaque,
+    Partly,
+}
+
+impl Scene {
+    /// Builds the trees, a mesh a thread, and gathers the lights.
+    pub fn new(data: SceneData, environment: Option<Environment>, view: View) -> Result<Self, BuildError> {
+        let trees = (data.meshes.par_iter())
+            .map(|mesh| MeshTree::build(&mesh.positions, &mesh.triangles))
+            .collect::<Result<Vec<_>, _>>()?;
+        let placements: Vec<Placement> = (data.instances.iter())
+            .map(|i| Placement { mesh: i.mesh.0, to_world: i.placement.to_world() })
+            .collect();
+        let aggregate = Aggregate::build(trees, &placements)?;
+        let opaque = data.materials.iter().all(|m| m.coverage == Coverage::Opaque);
+        let coverage = if opaque { SceneCoverage::Opaque } else { SceneCoverage::Partly };
+        let lights = Lights::new(&data, environment.as_ref());
+        Ok(Self { data, environment, lights, view, aggregate, coverage })
+    }
+
+    /// The nearest surface on a ray. A surface of partial coverage is there with the probability of its alpha,
+    /// decided by `key`.
+    #[inline]
+    pub fn closest(&self, ray: &Ray, key: impl FnOnce() -> u64) -> Option<Hit> {
+        if self.coverage == SceneCoverage::Opaque {
+            return self.aggregate.closest(ray, |_| true);
+        }
+        let key = key();
+        self.aggregate.closest(ray, |hit| {
+            let alpha = self.data.alpha(hit.instance, hit.triangle, hit.barycentric);
+            alpha >= 1.0 || decide(key, u64::from(hit.instance) << 32 | u64::from(hit.triangle)) < alpha
+        })
+    }
+
+    /// Share of light that passes along a ray: the product of 1 − α of all surfaces on it.
+    #[inline]
+    pub fn transmittance(&self, ray: &Ray) -> f32 {
+        if self.coverage == SceneCoverage::Opaque {
+            return if self.aggregate.occluded(ray, |_| true) { 0.0 } else { 1.0 };
+        }
+        self.aggregate
+            .transmittance(ray, |hit| 1.0 - self.data.alpha(hit.instance, hit.triangle, hit.barycentric))
+    }
+}

@@ -90,6 +90,14 @@ impl Picture {
         }
     }
 
+    /// Whether alpha is 1 everywhere.
+    pub fn is_opaque(&self) -> bool {
+        match &self.texels {
+            Texels::Bytes(texels) => texels.iter().all(|texel| texel[3] == u8::MAX),
+            Texels::Words(texels) => texels.iter().all(|texel| texel[3] == u16::MAX),
+        }
+    }
+
     #[inline]
     fn texel(&self, encoding: Encoding, x: u32, y: u32) -> Vec4 {
         let index = y as usize * self.width as usize + x as usize;

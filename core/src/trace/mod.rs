@@ -1,1 +1,18 @@
-//! Bounding volume hierarchies over triangles and instances; closest hit, any hit, transmittance.
+//! Bounding volume hierarchies over triangles and instances: closest hit, any hit, transmittance.
+
+pub mod aggregate;
+mod binary;
+pub mod bounds;
+#[cfg(test)]
+mod brute_force;
+pub mod build_error;
+mod collapse;
+pub mod instance;
+mod lanes;
+pub mod mesh;
+mod prepared;
+pub mod ray;
+pub mod surface_point;
+mod triangle;
+mod walk;
+mod wide;

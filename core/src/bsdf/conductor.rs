@@ -1,0 +1,71 @@
+//! A metal.
+
+use crate::bsdf::event::{Letter, Letters, Scattered};
+use crate::bsdf::fresnel::Schlick;
+use crate::bsdf::ggx::reflect;
+use crate::bsdf::gloss::{Gloss, RoughGloss, Seen};
+use crate::bsdf::lobe::{Delta, Drawn, Evaluated, split};
+use crate::math::colour::Rgb;
+use glam::{Vec2, Vec3};
+
+/// Reflects off its interface, on either side, and nothing else. Letter `S`, or `S_M` when smooth.
+#[derive(Clone, Copy, Debug)]
+pub struct Conductor {
+    gloss: Gloss,
+}
+
+impl Conductor {
+    pub(super) fn new(alpha: f32, f0: Rgb) -> Self {
+        Self { gloss: Gloss::new(alpha, Schlick { f0, f90: 1.0 }) }
+    }
+
+    pub(super) fn letters(&self) -> Letters {
+        match self.gloss {
+            Gloss::Smooth(_) => Letters::of(Letter::Specular),
+            Gloss::Rough(_) => Letters::of(Letter::Glossy),
+        }
+    }
+
+    pub(super) fn albedo(&self, wo: Vec3) -> Rgb {
+        self.gloss.albedo(upward(wo))
+    }
+
+    pub(super) fn evaluate(&self, wo: Vec3, wi: Vec3) -> Evaluated {
+        let Gloss::Rough(rough) = &self.gloss else { return Evaluated::default() };
+        if wo.z * wi.z <= 0.0 {
+            return Evaluated::default();
+        }
+        let (wo, wi) = (upward(wo), upward(wi));
+        let (o, i) = (rough.see(wo), rough.see(wi));
+        let (glossy, [pdf_single, pdf_multiple]) = rough.evaluate(wo, wi, &o, &i);
+        let first = share_of_first_bounce(&o);
+        let pdf = first * pdf_single + (1.0 - first) * pdf_multiple;
+        Evaluated { value: Scattered { diffuse: Rgb::ZERO, glossy }, pdf }
+    }
+
+    pub(super) fn draw(&self, wo: Vec3, u_lobe: f32, u: Vec2) -> Option<Drawn> {
+        let above = upward(wo);
+        let wi = match &self.gloss {
+            Gloss::Smooth(schlick) => {
+                let delta = Delta { value: schlick.at(above.z), probability: 1.0 };
+                return Some(Drawn { wi: reflect(wo, Vec3::Z), eta: 1.0, delta: Some(delta) });
+            }
+            Gloss::Rough(rough) => match split(u_lobe, share_of_first_bounce(&rough.see(above))) {
+                Ok(_) => rough.draw_single(above, u),
+                Err(_) => rough.between.draw(u),
+            },
+        };
+        (wi.z > 0.0).then(|| Drawn::smooth(wi.with_z(wi.z.copysign(wo.z))))
+    }
+}
+
+/// The direction or its mirror image, whichever is above the surface.
+#[inline]
+pub(super) fn upward(w: Vec3) -> Vec3 {
+    w.with_z(w.z.abs())
+}
+
+fn share_of_first_bounce(o: &Seen) -> f32 {
+    let [single, multiple] = RoughGloss::weights(o);
+    if single + multiple > 0.0 { single / (single + multiple) } else { 1.0 }
+}

@@ -1,0 +1,172 @@
+//! Sampled directions are distributed as the density says, over the whole sphere.
+
+use super::chart::{Chart, Kind};
+use super::*;
+use crate::bsdf::event::{SampleKind, Transport};
+
+const RADIAL: usize = 36;
+const AROUND: usize = 20;
+const SAMPLES: usize = 60_000;
+
+/// Expected numbers of samples in a chart's cells, for one sample: the midpoint rule, with more points in and
+/// around cells where few and very few do not agree (the horizon, total internal reflection).
+fn expected(bsdf: &Bsdf, wo: Vec3, chart: &Chart) -> Vec<f64> {
+    let cell = |i: usize, j: usize, n: usize| {
+        let (mut sum, mut outside) = (0.0, 0);
+        for k in 0..n * n {
+            let a = (i as f64 + ((k / n) as f64 + 0.5) / n as f64) / RADIAL as f64;
+            let b = (j as f64 + ((k % n) as f64 + 0.5) / n as f64) / AROUND as f64;
+            match chart.direction(a, b) {
+                Some(wi) => sum += f64::from(bsdf.pdf(wo, wi.as_vec3())) * chart.solid_angle(a, b),
+                None => outside += 1,
+            }
+        }
+        (sum / (n * n * RADIAL * AROUND) as f64, outside)
+    };
+    let (mut cells, mut cut) = (vec![0.0; RADIAL * AROUND], vec![false; RADIAL * AROUND]);
+    for (k, (value, cut)) in cells.iter_mut().zip(&mut cut).enumerate() {
+        let ((coarse, _), (fine, outside)) =
+            (cell(k / AROUND, k % AROUND, 3), cell(k / AROUND, k % AROUND, 5));
+        *value = fine;
+        *cut = (coarse - fine).abs() > 0.003 * fine + 1e-8 || (1..25).contains(&outside);
+    }
+    for i in 0..RADIAL {
+        for j in 0..AROUND {
+            let around = [(0, 0), (0, 1), (0, AROUND - 1), (1, 0), (RADIAL - 1, 0)];
+            let near = |(di, dj)| cut[(i + di) % RADIAL * AROUND + (j + dj) % AROUND];
+            if around.into_iter().any(near) {
+                cells[i * AROUND + j] = cell(i, j, 24).0;
+            }
+        }
+    }
+    cells
+}
+
+/// The standard normal deviate of a χ² test of samples against densities.
+fn deviate(bsdf: &Bsdf, wo: Vec3, alpha: f32, through: Kind, seed: u64) -> f64 {
+    let charts = [Chart::new(wo, alpha, Kind::Mirrored), Chart::new(wo, alpha, through)];
+    let mut wanted: Vec<f64> = charts.iter().flat_map(|chart| expected(bsdf, wo, chart)).collect();
+    let cells = wanted.len();
+    let mut counted = vec![0_u32; cells];
+    let (mut specular, mut absorbed, mut chance_sum) = (0_u32, 0_u32, 0.0);
+    let mut uniform = Uniform(seed);
+    let mut seen: Vec<(Vec3, f32)> = Vec::new();
+    for _ in 0..SAMPLES {
+        let Some(sample) = bsdf.sample(wo, uniform.next(), uniform.pair(), Transport::Radiance) else {
+            absorbed += 1;
+            continue;
+        };
+        match sample.kind {
+            SampleKind::Specular { probability, .. } => {
+                specular += 1;
+                if seen.iter().all(|(wi, p)| *wi != sample.wi || *p != probability) {
+                    seen.push((sample.wi, probability));
+                    chance_sum += f64::from(probability);
+                }
+            }
+            SampleKind::Smooth { pdf, .. } => {
+                assert!(pdf > 0.0);
+                let k = usize::from(!charts[0].covers(sample.wi));
+                let (a, b) = charts[k].locate(sample.wi);
+                // What has less slope than the chart's least is counted apart.
+                if (0.0..1.0).contains(&a) {
+                    let (i, j) = ((a * RADIAL as f64) as usize, (b * AROUND as f64) as usize);
+                    counted[k * cells / 2 + i * AROUND + j.min(AROUND - 1)] += 1;
+                } else {
+                    absorbed += 1;
+                }
+            }
+        }
+    }
+    let all: f64 = wanted.iter().sum::<f64>() + chance_sum;
+    assert!(all < 1.0 + 2e-3, "the densities add up to {all}");
+    wanted.extend([chance_sum, (1.0 - all).max(0.0)]);
+    counted.extend([specular, absorbed]);
+    chi_square(&wanted, &counted)
+}
+
+/// Pools cells until ten samples are expected in each; Wilson and Hilferty's transformation of χ².
+fn chi_square(wanted: &[f64], counted: &[u32]) -> f64 {
+    let (mut sum, mut degrees, mut pooled) = (0.0, -1.0, (0.0, 0.0));
+    for (w, c) in wanted.iter().zip(counted) {
+        pooled.0 += w * SAMPLES as f64;
+        pooled.1 += f64::from(*c);
+        if pooled.0 > 10.0 {
+            sum += (pooled.1 - pooled.0) * (pooled.1 - pooled.0) / pooled.0;
+            degrees += 1.0;
+            pooled = (0.0, 0.0);
+        }
+    }
+    assert!(pooled.1 < 30.0, "{} samples where {} are expected", pooled.1, pooled.0);
+    if degrees < 1.0 {
+        return 0.0;
+    }
+    let spread = 2.0 / (9.0 * degrees);
+    (libm::cbrt(sum / degrees) - (1.0 - spread)) / spread.sqrt()
+}
+
+/// 130 tests at a level of 0.01 together (Šidák) allow each 7.7e-5, one-sided.
+const LIMIT: f64 = 3.78;
+
+fn check(name: &str, surface: SurfaceParameters, alphas: &[f32], angles: &[f64], through: Kind) {
+    for &alpha in alphas {
+        let bsdf = rough(alpha, surface);
+        for (i, &angle) in angles.iter().enumerate() {
+            let wo = tilted(angle, 0.7);
+            let kind = match through {
+                Kind::Refracted(eta) if wo.z < 0.0 => Kind::Refracted(1.0 / eta),
+                other => other,
+            };
+            let deviate = deviate(&bsdf, wo, alpha.max(1e-3), kind, 17 + i as u64);
+            assert!(deviate < LIMIT, "{name} α {alpha} at {angle}°: {deviate:.2} standard deviations");
+        }
+    }
+}
+
+const ALPHAS: [f32; 4] = [1e-3, 0.02, 0.3, 1.0];
+const ABOVE: [f64; 4] = [1.0, 40.0, 80.0, 89.9];
+
+#[test]
+fn lambert() {
+    check("Lambert", LAMBERT, &[0.5], &[10.0, 89.9, 130.0], Kind::Through);
+}
+
+#[test]
+fn conductor() {
+    check("metal", METAL, &ALPHAS, &ABOVE, Kind::Through);
+    check("metal from behind", METAL, &[0.1], &[140.0], Kind::Through);
+    check("mirror", METAL, &[0.0], &[30.0], Kind::Through);
+}
+
+#[test]
+fn plastic() {
+    check("plastic", PLASTIC, &ALPHAS, &ABOVE, Kind::Through);
+    let bright = SurfaceParameters { ior: 3.0, base_color: Rgb::new(0.9, 0.2, 0.1), ..PLASTIC };
+    check("bright plastic", bright, &[0.0, 0.6], &[1.0, 70.0, 100.0], Kind::Through);
+}
+
+#[test]
+fn sheet() {
+    check("sheet", SHEET, &ALPHAS, &[20.0, 89.9, 110.0], Kind::Through);
+    let green = SurfaceParameters { base_color: Rgb::new(0.1, 0.8, 0.1), ..SHEET };
+    check("green sheet", green, &[0.0, 0.4], &[60.0], Kind::Through);
+}
+
+#[test]
+fn solid() {
+    let angles = [1.0, 50.0, 89.9, 100.0, 130.0, 137.0, 175.0];
+    check("glass", SOLID, &ALPHAS, &angles, Kind::Refracted(1.5));
+    let dense = SurfaceParameters { ior: 2.4, base_color: Rgb::new(0.1, 0.5, 0.9), ..SOLID };
+    check("dense glass", dense, &[0.0, 0.15, 0.6], &angles, Kind::Refracted(f64::from(2.4_f32)));
+    let thin = SurfaceParameters { ior: 1.02, ..SOLID };
+    check("hardly glass", thin, &[0.3], &angles, Kind::Refracted(f64::from(1.02_f32)));
+}
+
+#[test]
+fn mixture() {
+    let mixed = SurfaceParameters { metallic: 0.3, transmission: 0.5, ..SOLID };
+    check("mixture", mixed, &[0.0, 0.05, 0.5], &[30.0, 85.0, 120.0], Kind::Refracted(1.5));
+    let tinted =
+        SurfaceParameters { metallic: 0.6, transmission: 0.3, base_color: Rgb::new(0.2, 0.9, 0.4), ..SHEET };
+    check("tinted mixture", tinted, &[0.25], &[30.0, 100.0], Kind::Through);
+}

@@ -1,0 +1,114 @@
+//! Directional albedos: never above one, and one where nothing is absorbed.
+
+use super::*;
+use crate::bsdf::event::{SampleKind, Transport};
+
+/// Σ f |cos| / p over a rank-1 lattice; flux, so without the factor of radiance in refraction.
+fn albedo(bsdf: &Bsdf, wo: Vec3, points: u32) -> Rgb {
+    // Irrational steps from the plastic number (Roberts's R₂), and equal ones.
+    const STEP: [f64; 2] = [0.754_877_666_246_693, 0.569_840_290_998_053];
+    let mut sum = glam::DVec3::ZERO;
+    for i in 0..points {
+        let [u, v] = STEP.map(|step| ((0.5 + f64::from(i) * step).fract() as f32).min(1.0_f32.next_down()));
+        let w = (i as f32 + 0.5) / points as f32;
+        let weight = match bsdf.sample(wo, u, Vec2::new(v, w), Transport::Importance) {
+            None => continue,
+            Some(sample) => match sample.kind {
+                SampleKind::Smooth { value, pdf } => value.total() / pdf,
+                SampleKind::Specular { weight, .. } => weight,
+            },
+        };
+        sum += weight.as_dvec3();
+    }
+    (sum / f64::from(points)).as_vec3()
+}
+
+const ALPHAS: [f32; 9] = [0.0, 1e-3, 0.01, 0.04, 0.1, 0.25, 0.5, 0.8, 1.0];
+const ANGLES: [f64; 8] = [0.5, 25.0, 50.0, 65.0, 77.0, 85.0, 88.5, 89.9];
+
+#[test]
+fn white_opaque_surfaces_and_sheets_lose_nothing() {
+    let coloured = SurfaceParameters { specular_color: Rgb::new(3.0, 1.0, 0.0), ior: 1.8, ..PLASTIC };
+    let half = SurfaceParameters { specular: 0.5, ..PLASTIC };
+    let thin = SurfaceParameters { specular_color: Rgb::new(3.0, 1.0, 0.0), specular: 0.7, ..SHEET };
+    let mixture = SurfaceParameters { metallic: 0.4, transmission: 0.3, ..SHEET };
+    for (name, surface) in
+        [("Lambert", LAMBERT), ("metal", METAL), ("plastic", PLASTIC), ("coloured", coloured), ("half", half)]
+            .into_iter()
+            .chain([("sheet", SHEET), ("coloured sheet", thin), ("mixture", mixture)])
+    {
+        for alpha in ALPHAS {
+            let bsdf = rough(alpha, surface);
+            for angle in ANGLES {
+                // Where one lobe is worth little and rarely drawn, the lattice needs more points.
+                let error_of =
+                    |points| (albedo(&bsdf, tilted(angle, 2.0), points) - Rgb::ONE).abs().max_element();
+                let error = [1 << 12, 1 << 18].into_iter().map(error_of).find(|e| *e < 1e-3);
+                assert!(error.is_some(), "{name} α {alpha} at {angle}°");
+            }
+        }
+    }
+}
+
+#[test]
+fn white_glass_gains_nothing() {
+    for ior in [1.1, 1.5, 2.4] {
+        let surface = SurfaceParameters { ior, ..SOLID };
+        for alpha in ALPHAS {
+            let bsdf = rough(alpha, surface);
+            for angle in ANGLES.into_iter().flat_map(|angle| [angle, 180.0 - angle]) {
+                let found = albedo(&bsdf, tilted(angle, 2.0), 1 << 13).max_element();
+                assert!(found < 1.0 + 1e-3, "η {ior} α {alpha} at {angle}°: {found}");
+                assert!(found > if alpha < 1e-3 { 1.0 - 1e-5 } else { 0.0 }, "η {ior} α {alpha} at {angle}°");
+            }
+        }
+    }
+}
+
+#[test]
+fn no_surface_gains_energy() {
+    let mut uniform = Uniform(5);
+    for _ in 0..400 {
+        let surface = uniform.surface();
+        let bsdf = Bsdf::from_surface(&surface);
+        let wo = uniform.direction();
+        let found = albedo(&bsdf, wo, 1 << 12).max_element();
+        // Two lobes are drawn in proportion to luminance: the worst channel's error is about 1 %.
+        assert!(found < 1.0 + 1e-2, "{found} towards {wo} of {surface:?}");
+    }
+}
+
+#[test]
+fn smooth_glass_obeys_fresnel() {
+    for ior in [1.0 + 1e-7, 1.1, 1.5, 2.4, 0.0] {
+        for angle in ANGLES.into_iter().flat_map(|angle| [angle, 180.0 - angle]) {
+            let solid = rough(0.0, SurfaceParameters { ior, ..SOLID });
+            let (reflected, transmitted) = both_sides(&solid, tilted(angle, 1.0));
+            assert!((reflected + transmitted - 1.0).abs() < 1e-6, "η {ior} at {angle}°");
+            if ior > 0.0 && angle < 90.0 {
+                let sheet = rough(0.0, SurfaceParameters { ior, ..SHEET });
+                let (summed, rest) = both_sides(&sheet, tilted(angle, 1.0));
+                assert!((summed - 2.0 * reflected / (1.0 + reflected)).abs() < 1e-6, "η {ior} at {angle}°");
+                assert!((summed + rest - 1.0).abs() < 1e-6);
+            }
+        }
+    }
+    let none = rough(0.0, SurfaceParameters { ior: 1.0 + 1e-7, ..SOLID });
+    let straight = none.sample(tilted(70.0, 1.0), 0.0, Vec2::ZERO, Transport::Radiance).unwrap();
+    assert_eq!(straight.wi, -tilted(70.0, 1.0));
+}
+
+/// What an ideally specular surface reflects and transmits, of flux.
+fn both_sides(bsdf: &Bsdf, wo: Vec3) -> (f32, f32) {
+    let mut shares = (0.0, 0.0);
+    for u in [0.0, 1.0_f32.next_down()] {
+        let sample = bsdf.sample(wo, u, Vec2::splat(0.3), Transport::Importance).unwrap();
+        let SampleKind::Specular { weight, probability } = sample.kind else { panic!("not specular") };
+        if sample.wi.z * wo.z > 0.0 {
+            shares.0 = weight.x * probability;
+        } else {
+            shares.1 = weight.x * probability;
+        }
+    }
+    shares
+}

@@ -1,0 +1,155 @@
+//! A bundle to a scene.
+
+use crate::gltf::accessor::Source;
+use crate::gltf::assemble::{Assembled, assemble};
+use crate::gltf::buffers::Buffers;
+use crate::gltf::bundle::Bundle;
+use crate::gltf::document::Document;
+use crate::gltf::error::{LoadError, Problem, Problems};
+use crate::gltf::limits::Limits;
+use crate::gltf::report::{Dropped, Report};
+use crate::gltf::shapes::{Materials, Shape};
+use crate::gltf::textures::TextureTable;
+use crate::gltf::{cameras, extensions, lights, materials, nodes, pictures, shapes, survey};
+use crate::scene::data::SceneData;
+use crate::scene::material::{Coverage, Material, MaterialId};
+use crate::scene::texture::Texture;
+use std::collections::BTreeMap;
+
+/// A scene, and what is to be said about how it was read.
+#[derive(Debug)]
+pub struct Loaded {
+    /// The scene.
+    pub scene: SceneData,
+    /// What is odd about the file.
+    pub warnings: Vec<Problem>,
+    /// What is in the scene, in numbers.
+    pub report: Report,
+}
+
+/// Reads a scene: glTF 2.0 with the extensions that [`Bundle`]'s document may require. The result depends on
+/// nothing but the bytes and the limits.
+pub fn load(bundle: &Bundle, limits: &Limits) -> Result<Loaded, LoadError> {
+    let parts = bundle.parts()?;
+    let document = Document::parse(bundle.name(), &parts.json, limits)?;
+    let mut problems = Problems::default();
+    if parts.ignored > 0 {
+        problems.add("", format!("{} bytes of the container mean nothing to glTF 2.0", parts.ignored));
+    }
+    check_version(&document)?;
+    extensions::check(&document, &mut problems)?;
+    let buffers = Buffers::read(bundle, &document, parts.binary, limits)?;
+    let source = Source { document: &document, buffers: &buffers, limits };
+
+    let tree = nodes::read(&document, &mut problems)?;
+    let (mut table, mut dropped) = (TextureTable::default(), Dropped::default());
+    let mut shapes = shapes::find(source, &tree)?;
+    let read = shapes::read(source, &mut shapes, &mut table, &mut dropped, &mut problems)?;
+    let (meshes, instances) = count_uses(&shapes);
+    let pictures = pictures::read(bundle, source, &table.images())?;
+    survey::survey(bundle, source, &table.images(), &mut problems);
+    let textures = table.finish(&pictures);
+    let (materials, ids) = number_materials(&document, read, &shapes, &textures)?;
+    let Assembled { meshes: lists, instances: placed, bounds, normalisation } =
+        assemble(&document, &tree, shapes, &ids, &mut dropped, &mut problems)?;
+    let mut scene = SceneData {
+        meshes: lists,
+        instances: placed,
+        materials,
+        textures,
+        cameras: cameras::read(&document, &tree, &normalisation, &mut problems)?,
+        punctual: lights::read(&document, &tree, &normalisation, &mut problems)?,
+        bounds,
+        normalisation,
+    };
+    let metres = normalisation.metres(1.0);
+    for volume in scene.materials.iter_mut().filter_map(|m| m.volume.as_mut()) {
+        volume.absorption = (volume.absorption.as_dvec3() * metres).as_vec3();
+    }
+    let report = Report::of(&scene, meshes, instances, dropped);
+    point_out_what_is_missing(&scene, &report, &mut problems);
+    Ok(Loaded { scene, warnings: problems.finish(), report })
+}
+
+fn check_version(document: &Document) -> Result<(), LoadError> {
+    let root = document.root();
+    let asset = root.object("asset")?.ok_or_else(|| root.error("\"asset\" is missing: this is no glTF 2.0"))?;
+    for key in ["minVersion", "version"] {
+        let Some(text) = asset.text(key)? else {
+            continue;
+        };
+        let mut numbers = text.split('.').map(str::parse::<u32>);
+        match (key, numbers.next(), numbers.next(), numbers.next()) {
+            ("version", Some(Ok(2)), Some(Ok(_)), None) | ("minVersion", Some(Ok(2)), Some(Ok(0)), None) => {}
+            ("minVersion", Some(Ok(0 | 1)), Some(Ok(_)), None) => {}
+            (_, Some(Ok(major)), Some(Ok(minor)), None) => {
+                return Err(asset.error(format!("glTF {major}.{minor} is not supported; convert the scene to glTF 2.0")));
+            }
+            _ => return Err(asset.error(format!("\"{key}\" is not a version such as 2.0"))),
+        }
+    }
+    match asset.text("version")? {
+        Some(_) => Ok(()),
+        None => Err(asset.error("\"version\" is missing: this is no glTF 2.0")),
+    }
+}
+
+/// Meshes with anything in them, and the places at which they stand.
+fn count_uses(shapes: &[Shape]) -> (u64, u64) {
+    let mut meshes: Vec<usize> = shapes.iter().filter(|s| !s.is_empty()).map(|s| s.mesh).collect();
+    meshes.sort_unstable();
+    meshes.dedup();
+    let places = shapes.iter().filter(|s| !s.is_empty()).map(|s| s.places.len() as u64).sum();
+    (meshes.len() as u64, places)
+}
+
+/// Materials that triangles have, in the order of the document, the default one first.
+fn number_materials(
+    document: &Document,
+    read: Materials,
+    shapes: &[Shape],
+    textures: &[Texture],
+) -> Result<(Vec<Material>, BTreeMap<Option<usize>, MaterialId>), LoadError> {
+    let mut least_alpha: BTreeMap<Option<usize>, f32> = BTreeMap::new();
+    for geometry in shapes.iter().flat_map(|shape| &shape.geometries).filter(|g| !g.triangles.is_empty()) {
+        let least = least_alpha.entry(geometry.material).or_insert(1.0);
+        *least = geometry.colours.iter().fold(*least, |least, colour| least.min(colour.w));
+    }
+    let mut opaque: Vec<Option<bool>> = vec![None; textures.len()];
+    let (mut materials, mut ids) = (Vec::new(), BTreeMap::new());
+    for (index, material) in read {
+        let mut material = material.material;
+        if material.coverage != Coverage::Opaque {
+            let texture_is_opaque = material.base_color.texture.is_none_or(|slot| {
+                let known = &mut opaque[slot.texture.index()];
+                *known.get_or_insert_with(|| textures[slot.texture.index()].picture.is_opaque())
+            });
+            let least = least_alpha.get(&index).copied().unwrap_or(1.0);
+            materials::simplify(&mut material, least, texture_is_opaque);
+        }
+        let Ok(id) = u16::try_from(materials.len()) else {
+            let (file, pointer) = (document.file().to_owned(), "/materials".to_owned());
+            let found = document.count("materials") as u64;
+            return Err(LoadError::Limit { file, pointer, what: "materials", found, limit: 1 << 16 });
+        };
+        ids.insert(index, MaterialId(id));
+        materials.push(material);
+    }
+    Ok((materials, ids))
+}
+
+fn point_out_what_is_missing(scene: &SceneData, report: &Report, problems: &mut Problems) {
+    if report.triangles == 0 {
+        problems.add("", "there are no triangles: nothing can be seen but the background");
+    }
+    if scene.cameras.is_empty() {
+        problems.add("", "there is no camera: the scene is framed");
+    }
+    if report.emissive_triangles == 0 && scene.punctual.is_empty() {
+        problems.add("", "there is no light: the scene is lit by a default sky unless an environment is given");
+    }
+    let degenerate = report.dropped.degenerate_triangles;
+    if degenerate > 0 {
+        problems.add("", format!("{degenerate} triangles have no area and are left out"));
+    }
+}

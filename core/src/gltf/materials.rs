@@ -1,0 +1,185 @@
+//! Materials of a document.
+
+use crate::gltf::document::{At, Document};
+use crate::gltf::error::{LoadError, Problems};
+use crate::gltf::textures::{TextureTable, UvSets};
+use crate::scene::material::{Coverage, Material, Sides, Textured, Volume};
+use crate::scene::texture::Encoding;
+use glam::{Vec3, Vec4};
+
+/// A material and the sets of texture coordinates that its two stand for. The absorption of its volume is
+/// still per metre.
+pub(crate) struct Read {
+    pub(crate) material: Material,
+    pub(crate) sets: UvSets,
+    /// JSON pointer; empty for the default material.
+    pub(crate) pointer: String,
+}
+
+/// Collects what a material refers to.
+struct Reader<'a> {
+    document: &'a Document,
+    table: &'a mut TextureTable,
+    problems: &'a mut Problems,
+    sets: UvSets,
+}
+
+/// Reads a material; `None` is the default one.
+pub(crate) fn read(
+    document: &Document,
+    index: Option<usize>,
+    table: &mut TextureTable,
+    problems: &mut Problems,
+) -> Result<Read, LoadError> {
+    let Some(index) = index else {
+        return Ok(Read { material: Material::default(), sets: UvSets::default(), pointer: String::new() });
+    };
+    let item = document.item("materials", index)?;
+    let mut reader = Reader { document, table, problems, sets: UvSets::default() };
+    let mut material = Material { name: item.name(), ..Material::default() };
+    reader.core(&item, &mut material)?;
+    reader.emission(&item, &mut material)?;
+    reader.dielectric(&item, &mut material)?;
+    reader.transmission(&item, &mut material)?;
+    Ok(Read { material, sets: reader.sets, pointer: item.pointer })
+}
+
+/// Three numbers that are not negative.
+fn colour(at: &At<'_>, key: &str) -> Result<Option<Vec3>, LoadError> {
+    let Some(numbers) = at.numbers::<3>(key)? else {
+        return Ok(None);
+    };
+    let colour = Vec3::from(numbers.map(|v| v as f32));
+    if colour.is_finite() && colour.min_element() >= 0.0 {
+        Ok(Some(colour))
+    } else {
+        Err(at.error(format!("\"{key}\" holds a number that is negative or too large")))
+    }
+}
+
+impl Reader<'_> {
+    fn slot(
+        &mut self,
+        at: &At<'_>,
+        key: &str,
+        encoding: Encoding,
+    ) -> Result<Option<crate::scene::material::TextureSlot>, LoadError> {
+        self.table.slot(self.document, at, key, encoding, &mut self.sets, self.problems)
+    }
+
+    fn core(&mut self, item: &At<'_>, material: &mut Material) -> Result<(), LoadError> {
+        if let Some(pbr) = item.object("pbrMetallicRoughness")? {
+            if let Some(factor) = pbr.numbers::<4>("baseColorFactor")? {
+                material.base_color.factor = Vec4::from(factor.map(|v| v.clamp(0.0, 1.0) as f32));
+            }
+            material.base_color.texture = self.slot(&pbr, "baseColorTexture", Encoding::Srgb)?;
+            material.metallic = pbr.share("metallicFactor")?.unwrap_or(1.0);
+            material.roughness = pbr.share("roughnessFactor")?.unwrap_or(1.0);
+            if material.metallic > 0.0 || material.roughness > 0.0 {
+                material.metallic_roughness = self.slot(&pbr, "metallicRoughnessTexture", Encoding::Linear)?;
+            }
+        }
+        if let Some(info) = item.object("normalTexture")? {
+            let scale = info.number("scale")?.unwrap_or(1.0) as f32;
+            if scale != 0.0 && scale.is_finite() {
+                material.normal = self.slot(item, "normalTexture", Encoding::Linear)?.map(|slot| (slot, scale));
+            }
+        }
+        material.sides = if item.flag("doubleSided")?.unwrap_or(false) { Sides::Both } else { Sides::Front };
+        material.coverage = match item.text("alphaMode")? {
+            None | Some("OPAQUE") => Coverage::Opaque,
+            Some("BLEND") => Coverage::Blend,
+            Some("MASK") => Coverage::Mask { cutoff: item.number("alphaCutoff")?.unwrap_or(0.5) as f32 },
+            Some(_) => return Err(item.error("\"alphaMode\" must be OPAQUE, MASK or BLEND")),
+        };
+        Ok(())
+    }
+
+    fn emission(&mut self, item: &At<'_>, material: &mut Material) -> Result<(), LoadError> {
+        let factor = colour(item, "emissiveFactor")?.unwrap_or(Vec3::ZERO);
+        let strength = match item.extension("KHR_materials_emissive_strength")? {
+            Some(extension) => extension.number_from("emissiveStrength", 0.0)?.unwrap_or(1.0) as f32,
+            None => 1.0,
+        };
+        let radiance = factor * strength;
+        if !radiance.is_finite() {
+            return Err(item.error("its emission exceeds the range of numbers"));
+        }
+        material.emission = Textured::constant(radiance);
+        if material.emits() {
+            material.emission.texture = self.slot(item, "emissiveTexture", Encoding::Srgb)?;
+        }
+        Ok(())
+    }
+
+    fn dielectric(&mut self, item: &At<'_>, material: &mut Material) -> Result<(), LoadError> {
+        if let Some(extension) = item.extension("KHR_materials_ior")? {
+            material.ior = match extension.number("ior")?.unwrap_or(1.5) {
+                // The extension's way to say that everything is reflected.
+                0.0 => 1000.0,
+                ior if (1.0..=1000.0).contains(&ior) => ior as f32,
+                ior => return Err(extension.error(format!("\"ior\" is {ior}, but must be 0 or 1 to 1000"))),
+            };
+        }
+        if let Some(extension) = item.extension("KHR_materials_specular")? {
+            material.specular.factor = extension.share("specularFactor")?.unwrap_or(1.0);
+            material.specular_color.factor = colour(&extension, "specularColorFactor")?.unwrap_or(Vec3::ONE);
+            if material.specular.factor > 0.0 {
+                material.specular.texture = self.slot(&extension, "specularTexture", Encoding::Linear)?;
+                if material.specular_color.factor != Vec3::ZERO {
+                    material.specular_color.texture =
+                        self.slot(&extension, "specularColorTexture", Encoding::Srgb)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn transmission(&mut self, item: &At<'_>, material: &mut Material) -> Result<(), LoadError> {
+        let Some(extension) = item.extension("KHR_materials_transmission")? else {
+            return Ok(());
+        };
+        material.transmission.factor = extension.share("transmissionFactor")?.unwrap_or(0.0);
+        if material.transmission.factor == 0.0 {
+            return Ok(());
+        }
+        material.transmission.texture = self.slot(&extension, "transmissionTexture", Encoding::Linear)?;
+        let Some(volume) = item.extension("KHR_materials_volume")? else {
+            return Ok(());
+        };
+        if volume.number_from("thicknessFactor", 0.0)?.unwrap_or(0.0) > 0.0 {
+            material.volume = Some(Volume { absorption: absorption(&volume)? });
+        }
+        Ok(())
+    }
+}
+
+/// −ln(colour) / distance, per metre. Black would absorb infinitely; it is taken as the smallest float.
+fn absorption(volume: &At<'_>) -> Result<Vec3, LoadError> {
+    let colour = colour(volume, "attenuationColor")?.unwrap_or(Vec3::ONE).min(Vec3::ONE);
+    let Some(distance) = volume.number("attenuationDistance")? else {
+        return Ok(Vec3::ZERO);
+    };
+    if distance <= 0.0 {
+        return Err(volume.error(format!("\"attenuationDistance\" is {distance}, but must be positive")));
+    }
+    let one = |c: f32| (-libm::log(f64::from(c.max(f32::MIN_POSITIVE))) / distance) as f32;
+    let absorption = Vec3::new(one(colour.x), one(colour.y), one(colour.z)).max(Vec3::ZERO);
+    if absorption.is_finite() { Ok(absorption) } else { Err(volume.error("absorbs beyond the range of numbers")) }
+}
+
+/// Leaves out a coverage rule that changes nothing.
+pub(crate) fn simplify(material: &mut Material, least_vertex_alpha: f32, texture_is_opaque: bool) {
+    if !texture_is_opaque {
+        return;
+    }
+    let alpha = material.base_color.factor.w * least_vertex_alpha;
+    let covers = match material.coverage {
+        Coverage::Opaque => true,
+        Coverage::Mask { cutoff } => alpha >= cutoff,
+        Coverage::Blend => alpha >= 1.0,
+    };
+    if covers {
+        material.coverage = Coverage::Opaque;
+    }
+}

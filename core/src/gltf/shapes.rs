@@ -1,0 +1,224 @@
+//! Which meshes the scene uses, where, and their geometry.
+
+use crate::gltf::accessor::Source;
+use crate::gltf::error::{LoadError, Problems};
+use crate::gltf::geometry::{self, Geometry, Wanted};
+use crate::gltf::materials;
+use crate::gltf::nodes::Tree;
+use crate::gltf::report::Dropped;
+use crate::gltf::skin;
+use crate::gltf::textures::{TextureTable, UvSets};
+use crate::gltf::topology::Mode;
+use crate::scene::bounds::Bounds;
+use glam::DAffine3;
+use std::collections::BTreeMap;
+
+/// A mesh in one form: with its skin and weights.
+pub(crate) struct Shape {
+    /// Name of the mesh.
+    pub(crate) name: String,
+    /// Index of the mesh in the document.
+    pub(crate) mesh: usize,
+    weights: Vec<f64>,
+    skin: Option<usize>,
+    /// Mesh to file for each joint, if it has a skin.
+    pub(crate) joints: Vec<DAffine3>,
+    pub(crate) geometries: Vec<Geometry>,
+    /// Where it stands: indices into the tree's nodes. One at most where it has a skin.
+    pub(crate) places: Vec<usize>,
+}
+
+/// The materials of all shapes, by their index in the document.
+pub(crate) type Materials = BTreeMap<Option<usize>, materials::Read>;
+
+/// Finds the meshes that nodes of the tree have. Nodes share a shape if they have the same mesh, no skin, and
+/// the same morph weights.
+pub(crate) fn find(source: Source<'_>, tree: &Tree<'_>) -> Result<Vec<Shape>, LoadError> {
+    let document = source.document;
+    let mut shapes: Vec<Shape> = Vec::new();
+    let mut plain: BTreeMap<usize, usize> = BTreeMap::new();
+    let mut places = 0_u64;
+    for (place, node) in tree.nodes.iter().enumerate() {
+        let Some(mesh) = node.at.index("mesh", "meshes", document.count("meshes"))? else {
+            continue;
+        };
+        places += 1;
+        if places > source.limits.instances {
+            return Err(LoadError::Limit {
+                file: document.file().to_owned(),
+                pointer: node.at.pointer.clone(),
+                what: "instances",
+                found: places,
+                limit: source.limits.instances,
+            });
+        }
+        let item = document.item("meshes", mesh)?;
+        let skin = node.at.index("skin", "skins", document.count("skins"))?;
+        let own = weights(&node.at)?;
+        if skin.is_none()
+            && own.is_none()
+            && let Some(&known) = plain.get(&mesh)
+        {
+            shapes[known].places.push(place);
+            continue;
+        }
+        if skin.is_none() && own.is_none() {
+            plain.insert(mesh, shapes.len());
+        }
+        let weights = match own {
+            Some(weights) => weights,
+            None => weights_or_none(&item)?,
+        };
+        let joints = skin.map(|skin| skin::joints(source, tree, skin)).transpose()?.unwrap_or_default();
+        let (name, geometries) = (item.name(), Vec::new());
+        shapes.push(Shape { name, mesh, weights, skin, joints, geometries, places: vec![place] });
+    }
+    Ok(shapes)
+}
+
+fn weights(at: &crate::gltf::document::At<'_>) -> Result<Option<Vec<f64>>, LoadError> {
+    if at.get("weights").is_none() {
+        return Ok(None);
+    }
+    let number = |w: &crate::gltf::document::At<'_>| w.value.as_f64().ok_or_else(|| w.error("should be a number"));
+    at.elements("weights")?.iter().map(number).collect::<Result<_, _>>().map(Some)
+}
+
+fn weights_or_none(at: &crate::gltf::document::At<'_>) -> Result<Vec<f64>, LoadError> {
+    Ok(weights(at)?.unwrap_or_default())
+}
+
+/// Reads the geometry of all shapes and the materials they have.
+pub(crate) fn read(
+    source: Source<'_>,
+    shapes: &mut [Shape],
+    table: &mut TextureTable,
+    dropped: &mut Dropped,
+    problems: &mut Problems,
+) -> Result<Materials, LoadError> {
+    check_promised(source, shapes)?;
+    let mut read = Materials::new();
+    for shape in shapes {
+        let item = source.document.item("meshes", shape.mesh)?;
+        let primitives = item.items("primitives")?;
+        if primitives.is_empty() {
+            problems.add(&item.pointer, "has no primitives");
+        }
+        for primitive in &primitives {
+            let (mode, _) = geometry::promised(primitive, source)?;
+            if mode == Mode::NoSurface {
+                dropped.lines_and_points += 1;
+                problems.add(&primitive.pointer, "points and lines have no surface and are left out");
+                continue;
+            }
+            let index = primitive.index("material", "materials", source.document.count("materials"))?;
+            let material = match read.entry(index) {
+                std::collections::btree_map::Entry::Occupied(known) => known.into_mut(),
+                std::collections::btree_map::Entry::Vacant(new) => {
+                    new.insert(materials::read(source.document, index, table, problems)?)
+                }
+            };
+            let wanted = wanted(material, shape);
+            let Some(geometry) = geometry::read(primitive, source, wanted, &shape.weights, problems)? else {
+                continue;
+            };
+            dropped.degenerate_triangles += geometry.degenerate;
+            check_joints(&geometry, shape, &primitive.pointer, source)?;
+            point_out_thin_glass(&geometry, material, problems);
+            shape.geometries.push(geometry);
+        }
+    }
+    Ok(read)
+}
+
+fn wanted(read: &materials::Read, shape: &Shape) -> Wanted {
+    let material = &read.material;
+    // A set that only textures left out would have used is not read.
+    let mut sets = UvSets::default();
+    for slot in material.slots() {
+        let list = slot.set as usize;
+        sets.0[list] = read.sets.0[list];
+    }
+    let normal_map = material.normal.map(|(slot, _)| slot.set as usize);
+    let influences = if shape.skin.is_some() { skin::Wanted::Yes } else { skin::Wanted::No };
+    Wanted { sets, normal_map, influences }
+}
+
+/// Counts triangles before any is read.
+fn check_promised(source: Source<'_>, shapes: &[Shape]) -> Result<(), LoadError> {
+    let mut total = 0_u64;
+    for shape in shapes {
+        for primitive in source.document.item("meshes", shape.mesh)?.items("primitives")? {
+            total = total.saturating_add(geometry::promised(&primitive, source)?.1);
+            if total > source.limits.triangles {
+                return Err(LoadError::Limit {
+                    file: source.document.file().to_owned(),
+                    pointer: primitive.pointer,
+                    what: "triangles",
+                    found: total,
+                    limit: source.limits.triangles,
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
+fn check_joints(geometry: &Geometry, shape: &Shape, pointer: &str, source: Source<'_>) -> Result<(), LoadError> {
+    let greatest = geometry.influences.as_ref().map_or(0, skin::Influences::greatest);
+    if shape.skin.is_none() || greatest < shape.joints.len() {
+        return Ok(());
+    }
+    let joints = shape.joints.len();
+    Err(source.document.error(pointer, format!("a vertex hangs on joint {greatest}, but its skin has only {joints}")))
+}
+
+fn point_out_thin_glass(geometry: &Geometry, read: &materials::Read, problems: &mut Problems) {
+    let material = &read.material;
+    let thin = material.transmission.factor > 0.0 && material.volume.is_none();
+    if thin && geometry.looks_closed() {
+        problems.add(
+            &read.pointer,
+            "transmits light through the closed surface of a solid, but is thin-walled and does not refract; \
+             if a solid is meant, add KHR_materials_volume with a thicknessFactor above 0",
+        );
+    }
+}
+
+impl Shape {
+    /// Whether anything is left of it.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.geometries.iter().all(|g| g.triangles.is_empty())
+    }
+
+    /// A box around it at a place, in the file's space.
+    pub(crate) fn bounds_at(&self, world: &DAffine3, exact: Exact) -> Bounds {
+        let mut bounds = Bounds::EMPTY;
+        for geometry in &self.geometries {
+            if exact == Exact::No {
+                bounds = bounds.union(geometry.bounds().transformed(world));
+                continue;
+            }
+            for (v, p) in geometry.positions.iter().enumerate() {
+                let transform = self.transform(geometry, v, world);
+                bounds.include(transform.transform_point3(p.as_dvec3()));
+            }
+        }
+        bounds
+    }
+
+    /// Mesh to file of one vertex at a place: a skin's vertices go by their joints alone.
+    pub(crate) fn transform(&self, geometry: &Geometry, vertex: usize, world: &DAffine3) -> DAffine3 {
+        match &geometry.influences {
+            Some(influences) if self.skin.is_some() => influences.transform(vertex, &self.joints),
+            _ => *world,
+        }
+    }
+}
+
+/// Whether a box is drawn around every vertex or around a box.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Exact {
+    Yes,
+    No,
+}

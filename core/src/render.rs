@@ -1,1 +1,0 @@
-//! A batch of samples to its sum, on any number of threads.

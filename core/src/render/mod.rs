@@ -1,0 +1,7 @@
+//! A batch of samples to its sum, on any number of threads.
+
+pub mod batch;
+pub mod inspect;
+pub mod prepare;
+pub mod profile;
+pub mod progress;

@@ -1,0 +1,86 @@
+//! From bytes to a scene that is ready to be rendered.
+
+use crate::gltf::bundle::Bundle;
+use crate::gltf::error::LoadError;
+use crate::gltf::limits::Limits;
+use crate::gltf::load::load;
+use crate::scene::Scene;
+use crate::scene::camera::Camera;
+use crate::scene::data::SceneData;
+use crate::scene::environment::{Environment, EnvironmentError};
+use crate::scene::view::{LensInScene, View};
+use crate::settings::{CameraChoice, EnvironmentSource, Settings};
+use crate::trace::build_error::BuildError;
+use std::sync::Arc;
+
+/// Why a scene cannot be rendered as the settings say.
+#[derive(Debug, thiserror::Error)]
+pub enum PrepareError {
+    /// The scene cannot be read.
+    #[error(transparent)]
+    Load(#[from] LoadError),
+    /// The environment cannot be read.
+    #[error(transparent)]
+    Environment(#[from] EnvironmentError),
+    /// The settings name an image that did not come along.
+    #[error("the environment image {0} is not here")]
+    NoEnvironment(String),
+    /// The settings name a camera that the scene does not have.
+    #[error("there is no camera {index}: the scene has {count}, numbered from 0")]
+    NoCamera {
+        /// The number asked for.
+        index: u32,
+        /// Cameras of the scene.
+        count: usize,
+    },
+    /// The trees cannot be built.
+    #[error(transparent)]
+    Build(#[from] BuildError),
+}
+
+/// Reads a scene, builds its trees and gathers its lights. `environment` holds the bytes of the image that the
+/// settings name, if they do. A scene that nothing lights gets a default sky.
+pub fn prepare(
+    bytes: impl Into<Arc<[u8]>>,
+    environment: Option<&[u8]>,
+    settings: &Settings,
+) -> Result<Scene, PrepareError> {
+    let loaded = load(&Bundle::open(bytes)?, &Limits::default())?;
+    let data = loaded.scene;
+    let view = view(&data, settings)?;
+    let given = match &settings.environment {
+        None => None,
+        Some(given) => Some(match &given.source {
+            EnvironmentSource::Uniform(radiance) => Environment::uniform((*radiance).into()),
+            EnvironmentSource::Image(hash) => {
+                let bytes = environment.ok_or_else(|| PrepareError::NoEnvironment(hash.clone()))?;
+                Environment::decode(bytes, given.rotation_degrees)?
+            }
+        }),
+    };
+    let environment = given.or_else(|| (!is_lit(&data)).then(Environment::default_sky));
+    Ok(Scene::new(data, environment, view)?)
+}
+
+/// Whether a scene has light of its own.
+pub fn is_lit(data: &SceneData) -> bool {
+    !data.punctual.is_empty() || data.materials.iter().any(|m| m.emits())
+}
+
+fn view(data: &SceneData, settings: &Settings) -> Result<View, PrepareError> {
+    let framed;
+    let camera = match settings.camera {
+        CameraChoice::Framed => {
+            framed = Camera::framed(&data.bounds);
+            &framed
+        }
+        CameraChoice::Index(index) => (data.cameras.get(index as usize))
+            .ok_or(PrepareError::NoCamera { index, count: data.cameras.len() })?,
+    };
+    let distance = |metres: f64| data.normalisation.distance(metres) as f32;
+    let lens = settings.lens.map(|lens| LensInScene {
+        radius: distance(lens.radius),
+        focus_distance: distance(lens.focus_distance),
+    });
+    Ok(View::new(camera, settings.size, lens))
+}

@@ -1,0 +1,161 @@
+//! All lights of a scene, and the choice among them.
+
+use crate::math::choice::AliasTable;
+use crate::math::colour::{Rgb, luminance};
+use crate::scene::data::SceneData;
+use crate::scene::environment::Environment;
+use crate::scene::interaction::Interaction;
+use crate::scene::light::{Light, NextEvent, area, triangle_pdf};
+use crate::scene::material::{Material, Sides};
+use crate::scene::punctual::PunctualKind;
+use crate::scene::texture::Texture;
+use core::f64::consts::PI;
+use glam::{Vec2, Vec3};
+
+/// No light has this number.
+const NONE: u32 = u32::MAX;
+
+/// All lights of a scene, chosen in proportion to their power.
+#[derive(Clone, Debug, Default)]
+pub struct Lights {
+    lights: Vec<Light>,
+    choice: AliasTable,
+    /// For each instance, the light of each triangle; empty where none emits.
+    by_triangle: Vec<Vec<u32>>,
+    environment: Option<u32>,
+}
+
+impl Lights {
+    /// The lights of a scene. What has no power is left out.
+    pub fn new(data: &SceneData, environment: Option<&Environment>) -> Self {
+        let mut lights = Vec::new();
+        let mut powers = Vec::new();
+        let radiances: Vec<Rgb> = data.materials.iter().map(|m| mean_radiance(m, &data.textures)).collect();
+        let mut by_triangle = vec![Vec::new(); data.instances.len()];
+        for (i, instance) in data.instances.iter().enumerate() {
+            let mesh = &data.meshes[instance.mesh.index()];
+            for (t, material) in mesh.materials.iter().enumerate() {
+                let radiance = radiances[material.index()];
+                let material = &data.materials[material.index()];
+                if !material.emits() {
+                    continue;
+                }
+                let power = triangle_power(data, material.sides, radiance, i as u32, t as u32);
+                if power > 0.0 && power.is_finite() {
+                    let numbers: &mut Vec<u32> = &mut by_triangle[i];
+                    numbers.resize(mesh.triangles.len(), NONE);
+                    numbers[t] = lights.len() as u32;
+                    lights.push(Light::Triangle { instance: i as u32, triangle: t as u32 });
+                    powers.push(power);
+                }
+            }
+        }
+        let radius = data.bounds.radius().max(f64::MIN_POSITIVE);
+        for (i, punctual) in data.punctual.iter().enumerate() {
+            let power = punctual_power(&punctual.kind, radius);
+            if power > 0.0 && power.is_finite() {
+                lights.push(Light::Punctual(i as u32));
+                powers.push(power);
+            }
+        }
+        let mut from_environment = None;
+        if let Some(environment) = environment {
+            let power = environment.mean_luminance() * 4.0 * PI * PI * radius * radius;
+            if power > 0.0 && power.is_finite() {
+                from_environment = Some(lights.len() as u32);
+                lights.push(Light::Environment);
+                powers.push(power);
+            }
+        }
+        let choice = AliasTable::new(&powers).unwrap_or_default();
+        Self { lights, choice, by_triangle, environment: from_environment }
+    }
+
+    /// Number of lights.
+    pub fn len(&self) -> usize {
+        self.lights.len()
+    }
+
+    /// Whether nothing shines.
+    pub fn is_empty(&self) -> bool {
+        self.lights.is_empty()
+    }
+
+    /// A next event from `point`; its density includes the choice of the light.
+    pub fn sample(
+        &self,
+        data: &SceneData,
+        environment: Option<&Environment>,
+        point: Vec3,
+        choice: f32,
+        place: Vec2,
+    ) -> Option<NextEvent> {
+        if self.lights.is_empty() {
+            return None;
+        }
+        let (index, probability, _) = self.choice.sample(choice);
+        let event = self.lights[index].sample(data, environment, point, place)?;
+        Some(NextEvent { pdf: event.pdf * probability, ..event })
+    }
+
+    /// Density over solid angle at `point` of next events towards `at`, seen in `direction` on a triangle; zero
+    /// where that triangle is no light.
+    pub fn triangle_pdf(
+        &self,
+        data: &SceneData,
+        (instance, triangle): (u32, u32),
+        point: Vec3,
+        at: &Interaction<'_>,
+        direction: Vec3,
+    ) -> f32 {
+        match self.by_triangle[instance as usize].get(triangle as usize) {
+            Some(&light) if light != NONE => {
+                let pdf = triangle_pdf(data, instance, triangle, point, at, direction);
+                pdf * self.choice.probability(light as usize)
+            }
+            _ => 0.0,
+        }
+    }
+
+    /// Density over solid angle of next events in `direction` towards the environment.
+    pub fn environment_pdf(&self, environment: &Environment, direction: Vec3) -> f32 {
+        self.environment
+            .map_or(0.0, |light| environment.pdf(direction) * self.choice.probability(light as usize))
+    }
+}
+
+/// π · area · mean luminance, for each side that emits.
+fn triangle_power(data: &SceneData, sides: Sides, radiance: Rgb, instance: u32, triangle: u32) -> f64 {
+    let sides = match sides {
+        Sides::Front => 1.0,
+        Sides::Both => 2.0,
+    };
+    PI * sides * f64::from(area(data.corners(instance, triangle))) * f64::from(luminance(radiance))
+}
+
+/// The factor times the texture's mean; a texture that is black in the mean still counts a little, since a part
+/// of it may not be.
+fn mean_radiance(material: &Material, textures: &[Texture]) -> Rgb {
+    if !material.emits() {
+        return Vec3::ZERO;
+    }
+    let mean = material
+        .emission
+        .texture
+        .map_or(Vec3::ONE, |slot| textures[slot.texture.index()].average().truncate().max(Vec3::splat(1e-4)));
+    material.emission.factor * mean
+}
+
+/// Power as far as it can meet the scene, a sphere of `radius`.
+fn punctual_power(kind: &PunctualKind, radius: f64) -> f64 {
+    match *kind {
+        PunctualKind::Point { intensity, .. } => 4.0 * PI * f64::from(luminance(intensity)),
+        PunctualKind::Spot { intensity, inner_cos, outer_cos, .. } => {
+            let cos = 0.5 * f64::from(inner_cos + outer_cos);
+            2.0 * PI * (1.0 - cos).max(1e-6) * f64::from(luminance(intensity))
+        }
+        PunctualKind::Directional { irradiance, .. } => {
+            PI * radius * radius * f64::from(luminance(irradiance))
+        }
+    }
+}

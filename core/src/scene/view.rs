@@ -1,0 +1,87 @@
+//! A camera and a film: from a place in the frame to a ray.
+
+use crate::film::size::Size;
+use crate::math::warp;
+use crate::scene::camera::{Camera, Projection};
+use crate::trace::ray::Ray;
+use glam::{Vec2, Vec3};
+
+/// A camera with a frame to fill and a lens.
+#[derive(Clone, Debug)]
+pub struct View {
+    position: Vec3,
+    /// To the right edge, the top edge and the middle of the frame, from the eye (of an orthographic camera: the
+    /// first two from the middle, the third a unit vector).
+    right: Vec3,
+    up: Vec3,
+    forward: Vec3,
+    projection: ViewProjection,
+    size: Vec2,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum ViewProjection {
+    Pinhole,
+    /// Radius of the lens and distance of the plane in focus, in scene units, along unit axes.
+    Lens {
+        radius: f32,
+        focus_distance: f32,
+        across: [Vec3; 2],
+    },
+    Orthographic,
+}
+
+/// A thin lens in scene units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LensInScene {
+    /// Radius of the aperture.
+    pub radius: f32,
+    /// Distance of the plane in focus.
+    pub focus_distance: f32,
+}
+
+impl View {
+    /// Fills a frame of `size`. The vertical angle of view is the camera's; the horizontal one follows from the
+    /// frame. An orthographic camera ignores the lens.
+    pub fn new(camera: &Camera, size: Size, lens: Option<LensInScene>) -> Self {
+        let aspect = size.width as f32 / size.height as f32;
+        let (half_width, half_height, projection) = match camera.projection {
+            Projection::Perspective { tan_half_y, .. } => {
+                let projection = lens.map_or(ViewProjection::Pinhole, |lens| ViewProjection::Lens {
+                    radius: lens.radius,
+                    focus_distance: lens.focus_distance,
+                    across: [camera.right, camera.up],
+                });
+                (tan_half_y * aspect, tan_half_y, projection)
+            }
+            Projection::Orthographic { half_height, .. } => {
+                (half_height * aspect, half_height, ViewProjection::Orthographic)
+            }
+        };
+        Self {
+            position: camera.position,
+            right: camera.right * half_width,
+            up: camera.up * half_height,
+            forward: -camera.backward,
+            projection,
+            size: Vec2::new(size.width as f32, size.height as f32),
+        }
+    }
+
+    /// The ray through a place in the frame (pixels from the upper left corner) and, with a lens, a place on it
+    /// (unit square). Its direction has unit length.
+    pub fn ray(&self, place: Vec2, lens: Vec2) -> Ray {
+        let at = place / self.size * 2.0 - Vec2::ONE;
+        let off = self.right * at.x - self.up * at.y;
+        match self.projection {
+            ViewProjection::Pinhole => Ray::new(self.position, (self.forward + off).normalize()),
+            ViewProjection::Lens { radius, focus_distance, across } => {
+                let disk = warp::disk(lens) * radius;
+                let on_lens = across[0] * disk.x + across[1] * disk.y;
+                let in_focus = (self.forward + off) * focus_distance;
+                Ray::new(self.position + on_lens, (in_focus - on_lens).normalize())
+            }
+            ViewProjection::Orthographic => Ray::new(self.position + off, self.forward),
+        }
+    }
+}

@@ -1,0 +1,48 @@
+//! A ray and what it hits.
+
+use glam::{Vec2, Vec3};
+
+/// The points `origin + t · direction` with 0 < t < `t_max`.
+///
+/// A ray hits nothing where its origin is not finite or farther than 2⁶² from zero on an axis, where its
+/// direction is zero or not finite, or where `t_max` is NaN or not positive.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ray {
+    /// Where the ray starts, in world space.
+    pub origin: Vec3,
+    /// Where it goes; any length above zero, which is the unit of `t`.
+    pub direction: Vec3,
+    /// End of the ray in lengths of `direction`; may be infinite.
+    pub t_max: f32,
+}
+
+impl Ray {
+    /// The ray without an end.
+    pub fn new(origin: Vec3, direction: Vec3) -> Self {
+        Self { origin, direction, t_max: f32::INFINITY }
+    }
+}
+
+/// Where a ray meets a triangle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Distance in lengths of the ray's direction.
+    pub t: f32,
+    /// Index of the placement.
+    pub instance: u32,
+    /// Index of the triangle in its mesh.
+    pub triangle: u32,
+    /// Weights of the triangle's second and third vertex; the first has the rest.
+    pub barycentric: Vec2,
+}
+
+impl Hit {
+    /// Whether this hit is in front of `other`: nearer, or as near and of a smaller instance, then a smaller
+    /// triangle. This is a total order on the hits of one ray, so the nearest does not depend on the order in
+    /// which they are found.
+    #[inline]
+    pub(super) fn precedes(&self, other: &Hit) -> bool {
+        self.t < other.t
+            || (self.t == other.t && (self.instance, self.triangle) < (other.instance, other.triangle))
+    }
+}

@@ -1,0 +1,124 @@
+//! The same picture, bit for bit, however it is made.
+
+use glam::Vec3;
+use ovtigre_core::{
+    film::{batch::Batch, schedule::Schedule, size::Region, sum::Sum},
+    render::{batch::render, progress::Progress},
+    settings::Settings,
+};
+use ovtigre_tests::{
+    glb::Glb,
+    picture::{in_environment, rendered, scene, settings},
+    scenes::{cuboid, floor, glass, lambert, sphere},
+};
+use serde_json::json;
+
+/// A small scene with a bit of everything, all lengths times `scale`, then moved by `offset` along each axis.
+fn everything(scale: f64, offset: f64) -> Vec<u8> {
+    let mut glb = Glb::new();
+    let mut add = |material: serde_json::Value, (positions, triangles): (Vec<Vec3>, Vec<[u32; 3]>)| {
+        let material = glb.material(material);
+        let mesh = glb.mesh(&positions, &triangles, material);
+        glb.place(mesh);
+    };
+    add(lambert(0.6, 0.0), floor(-1.0, 10.0, 0.0, 0.0));
+    add(glass(1.5), sphere(Vec3::new(-1.0, 0.0, 0.0), 0.8, 12));
+    add(
+        json!({"pbrMetallicRoughness": {"roughnessFactor": 0.3}}),
+        cuboid(Vec3::new(0.3, -1.0, -0.5), Vec3::new(1.3, 0.2, 0.5)),
+    );
+    add(
+        json!({"pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": 0.2}}),
+        sphere(Vec3::new(0.2, -0.6, 1.2), 0.4, 12),
+    );
+    add(lambert(0.0, 6.0), ovtigre_tests::scenes::flipped(floor(2.5, 1.0, 0.5, 0.5)));
+    glb.perspective(Vec3::new(0.5, 1.0, 5.0), Vec3::new(0.0, -0.2, 0.0), 40.0);
+    glb.finish_under(json!({"scale": [scale, scale, scale], "translation": [offset, offset, offset]}))
+}
+
+fn sum(glb: &[u8], settings: &Settings, batch: Batch, threads: usize) -> Sum {
+    let scene = scene(glb, settings);
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    pool.install(|| render(&scene, settings, batch, &Progress::new()).unwrap())
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same_bits() {
+    let glb = everything(1.0, 0.0);
+    let settings = in_environment(settings(40, 30, 2), 0.2);
+    let batch = Schedule::new(settings.size.frame(), 1, 2, 64).batch(0, 1, 0).unwrap();
+    let one = sum(&glb, &settings, batch, 1);
+    assert!(one.planes[0].iter().flatten().sum::<f32>() > 0.0);
+    for threads in [2, 3, 8] {
+        assert!(one == sum(&glb, &settings, batch, threads), "{threads} threads");
+    }
+}
+
+#[test]
+fn a_pixel_does_not_know_the_region_it_is_rendered_in() {
+    let glb = everything(1.0, 0.0);
+    let settings = settings(24, 20, 1);
+    let scene = scene(&glb, &settings);
+    let frame = settings.size.frame();
+    let block = Schedule::new(frame, 1, 1, 64).blocks()[0];
+    let render = |region: Region| {
+        render(&scene, &settings, Batch { region, replicate: 0, block }, &Progress::new()).unwrap()
+    };
+    let whole = render(frame);
+    for region in frame.bands(24 * 7).into_iter().chain([Region { x: 5, y: 3, width: 11, height: 9 }]) {
+        let part = render(region);
+        for (i, pixel) in part.planes[0].iter().enumerate() {
+            let (x, y) = (
+                region.x as usize + i % region.width as usize,
+                region.y as usize + i / region.width as usize,
+            );
+            assert_eq!(*pixel, whole.planes[0][y * 24 + x], "pixel {x},{y}");
+        }
+    }
+}
+
+#[test]
+fn a_sample_does_not_know_the_block_it_is_rendered_in() {
+    let glb = everything(1.0, 0.0);
+    let settings = settings(8, 8, 1);
+    let scene = scene(&glb, &settings);
+    let one = |start: u32| {
+        let block = ovtigre_core::film::batch::Block { index: 0, start, count: 1 };
+        let batch = Batch { region: settings.size.frame(), replicate: 0, block };
+        render(&scene, &settings, batch, &Progress::new()).unwrap().planes.remove(0)
+    };
+    let block = ovtigre_core::film::batch::Block { index: 0, start: 16, count: 16 };
+    let batch = Batch { region: settings.size.frame(), replicate: 0, block };
+    let whole = render(&scene, &settings, batch, &Progress::new()).unwrap();
+    let singles: Vec<_> = (16..32).map(one).collect();
+    for pixel in 0..64 {
+        for c in 0..3 {
+            let sum: f64 = singles.iter().map(|plane| f64::from(plane[pixel][c])).sum();
+            assert_eq!(whole.planes[0][pixel][c], sum as f32);
+        }
+    }
+}
+
+#[test]
+fn scaling_by_a_power_of_two_changes_no_bit() {
+    let settings = settings(16, 12, 2);
+    let plain = rendered(&everything(1.0, 0.0), &settings, 16).picture();
+    for exponent in [-20, 20] {
+        let scaled = rendered(&everything(2.0_f64.powi(exponent), 0.0), &settings, 16).picture();
+        assert!(plain.planes == scaled.planes, "scaled by 2^{exponent}");
+    }
+}
+
+#[test]
+fn scaling_and_moving_change_the_picture_no_more_than_its_error() {
+    let settings = settings(16, 12, 16);
+    let plain = rendered(&everything(1.0, 0.0), &settings, 32);
+    let (mean, error) = plain.mean();
+    for (scale, offset) in [(1e-6, 0.0), (1e6, 0.0), (1.0, 1e5), (1e-6, 1e-1)] {
+        let other = rendered(&everything(scale, offset), &settings, 32);
+        let (other_mean, other_error) = other.mean();
+        let tolerance = 4.5 * error.hypot(other_error);
+        assert!((mean - other_mean).abs() < tolerance, "{scale} {offset}: {mean} {other_mean} ± {tolerance}");
+        assert_eq!(other.invalid(), 0);
+    }
+}
