@@ -49,6 +49,10 @@ impl Beat<'_> {
                     interval
                 }
                 Err(error) if error.status() == Some(404) && self.id.borrow().is_some() => {
+                    if self.bell.heard() > Leave::Stay {
+                        // It has said that it leaves, and is forgotten.
+                        std::future::pending::<()>().await;
+                    }
                     tracing::warn!("the farm does not know this worker any more: joining again");
                     self.desk.take_all();
                     self.id.send_replace(None);
