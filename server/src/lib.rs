@@ -3,5 +3,6 @@
 pub mod api;
 pub mod blobs;
 pub mod farm;
+pub mod inspect;
 pub mod serve;
 pub mod store;

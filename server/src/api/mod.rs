@@ -1,1 +1,53 @@
 //! Doors: HTTP to farm and back, no rules.
+
+pub mod body;
+pub mod curve;
+pub mod error;
+pub mod events;
+pub mod health;
+pub mod image;
+pub mod jobs;
+pub mod leases;
+pub mod params;
+pub mod range;
+pub mod scenes;
+pub mod tag;
+pub mod workers;
+
+#[cfg(test)]
+mod tests;
+
+use crate::farm::Farm;
+use axum::{
+    Router,
+    routing::{get, post, put},
+};
+use std::sync::Arc;
+
+/// All doors of a farm.
+pub fn router(farm: Arc<Farm>) -> Router {
+    Router::new()
+        .route("/v1/scenes", post(scenes::create))
+        .route("/v1/scenes/{id}", put(scenes::put).get(scenes::get))
+        .route("/v1/scenes/{id}/bytes", get(scenes::bytes))
+        .route("/v1/jobs", post(jobs::create).get(jobs::list))
+        .route("/v1/jobs/{id}", get(jobs::get).patch(jobs::patch).delete(jobs::delete))
+        .route("/v1/jobs/{id}/events", get(events::stream))
+        .route("/v1/jobs/{id}/image.exr", get(image::exr))
+        .route("/v1/jobs/{id}/image.png", get(image::png))
+        .route("/v1/jobs/{id}/error.json", get(curve::json))
+        .route("/v1/jobs/{id}/error.csv", get(curve::csv))
+        .route("/v1/workers", post(workers::join).get(workers::list))
+        .route("/v1/workers/{id}", get(workers::get).delete(workers::drain))
+        .route("/v1/workers/{id}/exchange", post(workers::exchange))
+        .route("/v1/leases/{id}/sum", put(leases::sum))
+        .route("/v1/leases/{id}/failure", post(leases::failure))
+        .route("/v1/scaling", get(health::scaling))
+        .route("/healthz", get(health::alive))
+        .route("/readyz", get(health::ready))
+        .route("/metrics", get(health::metrics))
+        .route("/", get(health::page))
+        .fallback(error::no_route)
+        .method_not_allowed_fallback(error::no_method)
+        .with_state(farm)
+}

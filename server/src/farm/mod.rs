@@ -1,1 +1,99 @@
 //! Rules, no HTTP: submit, split, lease, commit, append, checkpoint, stop, reap.
+
+pub mod append;
+pub mod book;
+pub mod checkpoint;
+pub mod commit;
+pub mod control;
+pub mod counters;
+pub mod crew;
+pub mod curve;
+pub mod error;
+pub mod ids;
+pub mod lease;
+pub mod live;
+pub mod open;
+pub mod picture;
+pub mod reap;
+pub mod rules;
+pub mod scene;
+pub mod spec;
+pub mod split;
+pub mod status;
+pub mod stop;
+pub mod submit;
+
+#[cfg(test)]
+mod tests;
+
+use crate::{
+    blobs::Blobs,
+    store::{Store, row::JobRow},
+};
+use book::Book;
+use counters::Counters;
+use crew::Crew;
+use error::{FarmError, Result};
+use ids::Ids;
+use live::{Live, held};
+use ovtigre_proto::id::JobId;
+use rules::Rules;
+use scene::Inspect;
+use std::{
+    collections::BTreeMap,
+    sync::{Arc, Mutex, MutexGuard},
+};
+use tokio_util::{sync::CancellationToken, task::TaskTracker};
+
+/// A farm: its memory, its files, and the jobs that are not over.
+#[derive(Debug)]
+pub struct Farm {
+    /// Its memory.
+    pub store: Arc<dyn Store>,
+    /// Its files.
+    pub blobs: Blobs,
+    /// Its numbers.
+    pub rules: Rules,
+    /// What it counts.
+    pub counters: Counters,
+    /// Cancelled when it stops.
+    pub stopping: CancellationToken,
+    inspect: Inspect,
+    ids: Ids,
+    tasks: TaskTracker,
+    decoders: tokio::sync::Semaphore,
+    inspectors: tokio::sync::Semaphore,
+    book: Mutex<Book>,
+    crew: Mutex<Crew>,
+    lives: Mutex<BTreeMap<JobId, Arc<Live>>>,
+}
+
+impl Farm {
+    fn book(&self) -> MutexGuard<'_, Book> {
+        held(&self.book)
+    }
+
+    fn crew(&self) -> MutexGuard<'_, Crew> {
+        held(&self.crew)
+    }
+
+    /// A job that is not over, or not settled.
+    pub fn live(&self, id: &JobId) -> Option<Arc<Live>> {
+        held(&self.lives).get(id).cloned()
+    }
+
+    fn lives(&self) -> Vec<Arc<Live>> {
+        held(&self.lives).values().cloned().collect()
+    }
+
+    fn forget_live(&self, id: &JobId) {
+        if let Some(live) = held(&self.lives).remove(id) {
+            live.changed();
+        }
+    }
+
+    /// A job in the store.
+    pub async fn job_row(&self, id: &JobId) -> Result<JobRow> {
+        self.store.job(id).await?.ok_or_else(|| FarmError::not_found("job", id))
+    }
+}

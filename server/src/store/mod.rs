@@ -1,1 +1,95 @@
 //! Jobs, leases and commits, changed together or not at all.
+//!
+//! A store has no rules beyond atomicity and its clock. What may be done is the farm's to decide.
+
+pub mod error;
+pub mod row;
+pub mod sqlite;
+
+#[cfg(test)]
+pub mod contract;
+
+use error::Result;
+use ovtigre_proto::{
+    curve::CurveRow,
+    id::{BlobId, JobId, LeaseId, WorkerId},
+    lease::WorkerJoin,
+    scene::SceneReport,
+    status::WorkerState,
+};
+use row::{
+    Added, Claim, CommitOutcome, CommitRow, Counts, IdempotencyKey, JobChange, JobFilter, JobRow, Lane,
+    Ledger, NewCheckpoint, NewCommit, NewJob, Released, SceneRow, WorkerRow,
+};
+use std::{fmt, ops::Range, time::Duration};
+
+/// The farm's memory. Each call is one transaction: durable when it returns, without effect when
+/// it fails. Leases, pauses and losses are measured by the store's own clock.
+#[async_trait::async_trait]
+pub trait Store: Send + Sync + fmt::Debug {
+    /// Remembers an uploaded file; again changes nothing.
+    async fn add_scene(&self, report: SceneReport) -> Result<()>;
+    /// An uploaded file.
+    async fn scene(&self, id: &BlobId) -> Result<Option<SceneRow>>;
+
+    /// Adds a job with a cursor at block 0 of each lane, unless `key` was used before.
+    async fn add_job(&self, job: NewJob, key: Option<IdempotencyKey>) -> Result<Added>;
+    /// A job.
+    async fn job(&self, id: &JobId) -> Result<Option<JobRow>>;
+    /// Jobs, the newest first.
+    async fn jobs(&self, filter: JobFilter) -> Result<Vec<JobRow>>;
+    /// Jobs that are not over, or whose files do not have their last form, the oldest first.
+    async fn unsettled_jobs(&self) -> Result<Vec<JobRow>>;
+    /// Changes a job that still has `version`, and counts it up; false where it has not. A job that
+    /// is over loses its cursors, leases and failures; pauses are taken off its run time.
+    async fn change_job(&self, id: &JobId, version: u64, change: JobChange) -> Result<bool>;
+    /// Forgets a job and all of it; false where there was none.
+    async fn remove_job(&self, id: &JobId) -> Result<bool>;
+
+    /// What a job's work looks like.
+    async fn ledger(&self, job: &JobId) -> Result<Ledger>;
+    /// Hands out each batch that is the next of its lane or was returned, of a job that is queued
+    /// or running, for `time`; says which. A queued job runs from its first batch on.
+    async fn claim(&self, claims: Vec<Claim>, time: Duration) -> Result<Vec<bool>>;
+    /// Gives those leases `time` from now that `worker` still has; says which.
+    async fn renew(&self, worker: &WorkerId, leases: Vec<LeaseId>, time: Duration) -> Result<Vec<LeaseId>>;
+    /// Ends a lease and returns its batch; `failure` is counted against batch and worker. `None`
+    /// where there is no such lease.
+    async fn release(&self, lease: &LeaseId, failure: Option<String>) -> Result<Option<Released>>;
+    /// Ends the leases whose time is over as failures, returns their batches.
+    async fn expire(&self) -> Result<Vec<Released>>;
+    /// Records a batch's sum if there is none, ends its lease; otherwise compares.
+    async fn commit(&self, commit: NewCommit) -> Result<CommitOutcome>;
+    /// What was brought of some blocks of a lane.
+    async fn commits(&self, job: &JobId, lane: Lane, blocks: Range<u32>) -> Result<Vec<CommitRow>>;
+    /// Remembers that the first `blocks` blocks of a lane are kept as one blob.
+    async fn set_snapshot(&self, job: &JobId, lane: Lane, blocks: u32) -> Result<()>;
+    /// Adds a checkpoint; again changes nothing.
+    async fn add_checkpoint(&self, job: &JobId, checkpoint: NewCheckpoint) -> Result<()>;
+    /// A job's checkpoints in order.
+    async fn curve(&self, job: &JobId) -> Result<Vec<CurveRow>>;
+
+    /// A worker joins.
+    async fn add_worker(&self, id: &WorkerId, join: WorkerJoin) -> Result<()>;
+    /// A worker is heard of, and stands so from now on; false where there is none.
+    async fn see_worker(&self, id: &WorkerId, state: WorkerState) -> Result<bool>;
+    /// A worker stands so from now on; false where there is none.
+    async fn set_worker_state(&self, id: &WorkerId, state: WorkerState) -> Result<bool>;
+    /// A worker.
+    async fn worker(&self, id: &WorkerId) -> Result<Option<WorkerRow>>;
+    /// Workers that joined before the one with sequence `before`, the newest first, with their sequences.
+    async fn workers(&self, before: Option<i64>, limit: u32) -> Result<Vec<(i64, WorkerRow)>>;
+    /// Marks active and draining workers as lost that were not heard of for `time`; says which.
+    async fn lose_workers(&self, time: Duration) -> Result<Vec<WorkerId>>;
+    /// Workers that hold a batch of the job.
+    async fn workers_of(&self, job: &JobId) -> Result<u32>;
+
+    /// Forgets idempotency keys older than `age`.
+    async fn forget_keys(&self, age: Duration) -> Result<()>;
+    /// Numbers for gauges.
+    async fn counts(&self) -> Result<Counts>;
+    /// Whether it answers.
+    async fn ping(&self) -> Result<()>;
+    /// Finishes what is under way and lets go of the database.
+    async fn close(&self);
+}

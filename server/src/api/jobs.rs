@@ -1,0 +1,143 @@
+//! `/v1/jobs`
+
+use super::{
+    body::Document,
+    error::{ApiError, Result},
+    params::{Params, cursor, id, limit},
+    tag,
+};
+use crate::farm::{Farm, spec::JobSpec};
+use axum::{
+    Json,
+    extract::{Path, State},
+    http::{HeaderMap, StatusCode, header},
+    response::{IntoResponse as _, Response},
+};
+use ovtigre_core::{film::size::Region, settings::Settings};
+use ovtigre_proto::{
+    id::JobId,
+    job::{JobPatch, JobRequest},
+    route,
+    status::{JobState, JobStatus, Page},
+};
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// How a job is sent.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CreateParams {
+    #[serde(default)]
+    dry_run: bool,
+}
+
+/// What a job would be.
+#[derive(Debug, Serialize)]
+struct DryRun {
+    settings: Settings,
+    region: Region,
+    samples_asked: u32,
+    batches_asked: u64,
+    method: &'static str,
+    method_reason: String,
+    paths: String,
+    warnings: Vec<String>,
+}
+
+impl From<JobSpec> for DryRun {
+    fn from(spec: JobSpec) -> Self {
+        Self {
+            region: spec.region,
+            samples_asked: spec.samples_asked(),
+            batches_asked: spec.schedule().batches(),
+            method: spec.settings.method.name(),
+            settings: spec.settings,
+            method_reason: spec.method_reason,
+            paths: spec.paths,
+            warnings: spec.warnings,
+        }
+    }
+}
+
+/// A job is sent.
+pub async fn create(
+    State(farm): State<Arc<Farm>>,
+    Params(params): Params<CreateParams>,
+    headers: HeaderMap,
+    Document(request): Document<JobRequest>,
+) -> Result<Response> {
+    if params.dry_run {
+        return Ok(Json(DryRun::from(farm.check(request).await?)).into_response());
+    }
+    let key = match headers.get("idempotency-key").map(|value| value.to_str()) {
+        None => None,
+        Some(Ok(key)) => Some(key.to_owned()),
+        Some(Err(_)) => return Err(ApiError::header("Idempotency-Key is not ASCII text")),
+    };
+    let status = farm.submit(request, key).await?;
+    let location = [(header::LOCATION, route::job(&status.id))];
+    Ok((StatusCode::ACCEPTED, location, with_tag(status)).into_response())
+}
+
+/// Which jobs are listed.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ListParams {
+    state: Option<JobState>,
+    limit: Option<u32>,
+    cursor: Option<String>,
+}
+
+/// Jobs, the newest first.
+pub async fn list(
+    State(farm): State<Arc<Farm>>,
+    Params(params): Params<ListParams>,
+) -> Result<Json<Page<JobStatus>>> {
+    let before = cursor(params.cursor.as_deref())?;
+    Ok(Json(farm.jobs(params.state, before, limit(params.limit)?).await?))
+}
+
+/// A job.
+pub async fn get(State(farm): State<Arc<Farm>>, Path(name): Path<String>) -> Result<Response> {
+    Ok(with_tag(farm.status(&id("job", &name)?).await?))
+}
+
+/// A job is changed.
+pub async fn patch(
+    State(farm): State<Arc<Farm>>,
+    Path(name): Path<String>,
+    headers: HeaderMap,
+    Document(patch): Document<JobPatch>,
+) -> Result<Response> {
+    let id: JobId = id("job", &name)?;
+    let version = tag::match_version(&headers)?;
+    Ok(with_tag(farm.patch(&id, &patch, version).await?))
+}
+
+/// How a job is deleted.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DeleteParams {
+    #[serde(default)]
+    purge: bool,
+}
+
+/// A job is cancelled, or removed with its files.
+pub async fn delete(
+    State(farm): State<Arc<Farm>>,
+    Path(name): Path<String>,
+    Params(params): Params<DeleteParams>,
+) -> Result<Response> {
+    let id: JobId = id("job", &name)?;
+    if params.purge {
+        farm.purge(&id).await?;
+        return Ok(StatusCode::NO_CONTENT.into_response());
+    }
+    farm.cancel(&id).await?;
+    Ok(with_tag(farm.status(&id).await?))
+}
+
+/// The tag is that of what a client can change: progress does not change it.
+fn with_tag(status: JobStatus) -> Response {
+    ([(header::ETAG, tag::strong(&status.version.to_string()))], Json(status)).into_response()
+}

@@ -1,0 +1,58 @@
+//! Names in a path and parameters of a query.
+
+use super::error::ApiError;
+use axum::{
+    extract::{FromRequestParts, Query},
+    http::request::Parts,
+};
+use serde::{Deserialize, de::DeserializeOwned};
+use std::str::FromStr;
+
+/// A query as what it says.
+#[derive(Debug)]
+pub struct Params<T>(pub T);
+
+impl<T: DeserializeOwned, S: Send + Sync> FromRequestParts<S> for Params<T> {
+    type Rejection = ApiError;
+
+    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, ApiError> {
+        Query::try_from_uri(&parts.uri).map(|Query(params)| Self(params)).map_err(|error| {
+            let text = error.body_text();
+            let detail = text.rsplit_once("query string: ").map_or(&*text, |(_, detail)| detail);
+            let name = detail.split([':', '`']).next().unwrap_or("").trim();
+            ApiError::parameter(if name.contains(' ') { "" } else { name }, detail)
+        })
+    }
+}
+
+/// Where a page of a list begins, and how long it is.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PageParams {
+    /// Items at most.
+    pub limit: Option<u32>,
+    /// `next` of the page before.
+    pub cursor: Option<String>,
+}
+
+/// Where a page begins, from the `next` of the one before.
+pub fn cursor(text: Option<&str>) -> Result<Option<i64>, ApiError> {
+    let parse = |text: &str| {
+        text.parse().map_err(|_| ApiError::parameter("cursor", format!("'{text}' is no page's 'next'")))
+    };
+    text.map(parse).transpose()
+}
+
+/// Items of a page.
+pub fn limit(limit: Option<u32>) -> Result<u32, ApiError> {
+    use crate::farm::status::{PAGE, PAGE_MAX};
+    match limit.unwrap_or(PAGE) {
+        n if (1..=PAGE_MAX).contains(&n) => Ok(n),
+        n => Err(ApiError::parameter("limit", format!("{n} is not 1 to {PAGE_MAX}"))),
+    }
+}
+
+/// A name in a path; a text that can name nothing is not found.
+pub fn id<T: FromStr>(what: &str, text: &str) -> Result<T, ApiError> {
+    text.parse().map_err(|_| ApiError::not_found(what, text))
+}

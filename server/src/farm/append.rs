@@ -1,0 +1,392 @@
+//! Batches become prefixes: each lane is appended in block order, and no lane goes past a
+//! checkpoint before all have reached it.
+
+use super::{
+    Farm,
+    error::{FarmError, Result},
+    live::{Arrival, Live, View},
+    spec::LAYERS,
+    split::lanes,
+};
+use crate::{
+    blobs::{BlobError, BlobName},
+    store::row::{BatchKey, CommitRow, Lane, Progress},
+};
+use bytes::Bytes;
+use ovtigre_core::film::{append::Prefix, exr, schedule::Schedule, sum::Sum};
+use ovtigre_proto::id::JobId;
+use std::{
+    collections::{BTreeMap, VecDeque},
+    sync::Arc,
+    time::Instant,
+};
+use tokio::sync::OwnedMutexGuard;
+
+/// Batches appended in one go, between two looks at what else happened.
+const GO: usize = 8;
+
+/// A job's sums, and what waits to be added to them.
+#[derive(Debug)]
+pub struct Merge {
+    schedule: Arc<Schedule>,
+    /// Region by region, replicate by replicate.
+    pub prefixes: Vec<Vec<Prefix>>,
+    /// Time workers spent on what is appended, in microseconds.
+    pub worker_micros: u64,
+    /// Checkpoints taken.
+    pub checkpoints: u32,
+    /// When it was needed last.
+    pub used: Instant,
+    points: Vec<u32>,
+    waiting: BTreeMap<BatchKey, Arrival>,
+    snapshots: BTreeMap<Lane, u32>,
+}
+
+/// What the lanes can do now.
+#[derive(Debug)]
+pub enum Next {
+    /// Add these.
+    Append(Vec<Arrival>),
+    /// All lanes have reached a checkpoint, or the end: look.
+    Look,
+    /// Wait for more.
+    Wait,
+}
+
+impl Merge {
+    /// No block yet, or the blobs of sums that are kept of some lanes.
+    pub fn new(
+        schedule: Arc<Schedule>,
+        kept: Vec<Prefix>,
+        commits: Vec<CommitRow>,
+        checkpoints: u32,
+    ) -> Self {
+        let mut prefixes: Vec<Vec<Prefix>> = (schedule.regions().iter())
+            .map(|r| (0..schedule.replicates()).map(|n| Prefix::empty(*r, n, LAYERS as usize)).collect())
+            .collect();
+        let mut snapshots = BTreeMap::new();
+        for prefix in kept {
+            let region = schedule.regions().iter().position(|r| *r == prefix.region());
+            let place = region.and_then(|r| prefixes[r].get_mut(prefix.replicate() as usize).map(|p| (r, p)));
+            if let Some((region, place)) = place {
+                let lane = Lane { replicate: prefix.replicate(), region: region as u32 };
+                snapshots.insert(lane, prefix.blocks());
+                *place = prefix;
+            }
+        }
+        let points = schedule.checkpoints().into_iter().map(|blocks| blocks as u32).collect();
+        let mut merge = Self {
+            schedule,
+            prefixes,
+            worker_micros: 0,
+            checkpoints,
+            used: Instant::now(),
+            points,
+            waiting: BTreeMap::new(),
+            snapshots,
+        };
+        for row in commits {
+            if row.batch.block < merge.prefix(row.batch.lane()).blocks() {
+                merge.worker_micros += row.worker_micros;
+            } else {
+                merge.add(Arrival { row, sum: None });
+            }
+        }
+        merge
+    }
+
+    /// The sums of a lane.
+    pub fn prefix(&self, lane: Lane) -> &Prefix {
+        &self.prefixes[lane.region as usize][lane.replicate as usize]
+    }
+
+    /// A batch was brought: it waits, unless it is in already.
+    pub fn add(&mut self, arrival: Arrival) {
+        let batch = arrival.row.batch;
+        if batch.block >= self.prefix(batch.lane()).blocks() {
+            let before = self.waiting.remove(&batch);
+            let sum = arrival.sum.or(before.and_then(|b| b.sum));
+            self.waiting.insert(batch, Arrival { row: arrival.row, sum });
+        }
+    }
+
+    /// Blocks at which the lanes wait for each other.
+    fn limit(&self) -> u32 {
+        self.points.get(self.checkpoints as usize).copied().unwrap_or(self.schedule.blocks().len() as u32)
+    }
+
+    /// Takes what can be appended now, lowest block first.
+    pub fn next(&mut self) -> Next {
+        let limit = self.limit();
+        let mut heads: VecDeque<Lane> = lanes(&self.schedule).collect();
+        let mut reach: BTreeMap<Lane, u32> = heads.iter().map(|l| (*l, self.prefix(*l).blocks())).collect();
+        let mut ready = Vec::new();
+        while let Some(lane) = heads.pop_front()
+            && ready.len() < GO
+        {
+            let block = reach[&lane];
+            if block < limit
+                && let Some(arrival) = self.waiting.remove(&lane.at(block))
+            {
+                ready.push(arrival);
+                reach.insert(lane, block + 1);
+                heads.push_back(lane);
+            }
+        }
+        if !ready.is_empty() {
+            return Next::Append(ready);
+        }
+        let at_limit = reach.values().all(|blocks| *blocks == limit);
+        if at_limit && (self.checkpoints as usize) < self.points.len() { Next::Look } else { Next::Wait }
+    }
+
+    /// Adds a sum to its lane.
+    fn append(&mut self, row: &CommitRow, sum: &Sum) -> Result<()> {
+        let Lane { replicate, region } = row.batch.lane();
+        let prefix = &mut self.prefixes[region as usize][replicate as usize];
+        prefix.append(sum).map_err(|e| FarmError::Damaged(e.to_string()))?;
+        self.worker_micros += row.worker_micros;
+        Ok(())
+    }
+
+    /// Whether all that the schedule has is in.
+    pub fn is_complete(&self) -> bool {
+        let blocks = self.schedule.blocks().len() as u32;
+        self.prefixes.iter().flatten().all(|p| p.blocks() == blocks)
+    }
+
+    /// Whether each pixel has a sample.
+    pub fn has_picture(&self) -> bool {
+        self.prefixes.iter().all(|region| region.iter().any(|p| p.samples() > 0))
+    }
+
+    /// What is in the picture.
+    pub fn progress(&self) -> Progress {
+        let pixels: f64 = self.schedule.regions().iter().map(|r| r.pixels() as f64).sum();
+        let all = || self.prefixes.iter().flatten();
+        Progress {
+            samples: all().map(|p| f64::from(p.samples()) * p.region().pixels() as f64).sum::<f64>() / pixels,
+            batches: all().map(|p| u64::from(p.blocks())).sum(),
+            worker_micros: self.worker_micros,
+            rays: all().map(Prefix::rays).sum(),
+            invalid: all().map(|p| p.invalid().total()).sum(),
+        }
+    }
+
+    /// Hash of the set of batches in the picture: of all that its pixels depend on.
+    pub fn manifest(&self, identity: &blake3::Hash) -> Option<String> {
+        if !self.has_picture() {
+            return None;
+        }
+        let mut hasher = blake3::Hasher::new();
+        hasher.update(identity.as_bytes());
+        for lane in lanes(&self.schedule) {
+            let prefix = self.prefix(lane);
+            for n in [lane.region, lane.replicate, prefix.blocks(), prefix.samples()] {
+                hasher.update(&n.to_le_bytes());
+            }
+        }
+        Some(hasher.finalize().to_hex().to_string())
+    }
+
+    /// Lanes with so many partials since their last blob of sums, and that number of blocks.
+    fn overdue(&self, partials: u32) -> Vec<(Lane, u32)> {
+        let since = |lane: &Lane| self.snapshots.get(lane).copied().unwrap_or(0);
+        lanes(&self.schedule)
+            .filter(|lane| self.prefix(*lane).blocks() >= since(lane) + partials)
+            .map(|lane| (lane, since(&lane)))
+            .collect()
+    }
+}
+
+/// A job's sums, held.
+pub type Held = OwnedMutexGuard<Option<Merge>>;
+
+impl Farm {
+    /// A job's sums, read from their blobs where they are not in memory.
+    pub async fn sums(&self, live: &Live) -> Result<Held> {
+        let mut held = Arc::clone(&live.merge).lock_owned().await;
+        if held.is_none() {
+            self.make_room(live).await;
+            *held = Some(self.load(live).await?);
+        }
+        if let Some(merge) = held.as_mut() {
+            merge.used = Instant::now();
+        }
+        Ok(held)
+    }
+
+    async fn load(&self, live: &Live) -> Result<Merge> {
+        let ledger = self.store.ledger(&live.id).await?;
+        let mut kept = Vec::with_capacity(ledger.snapshots.len());
+        for (lane, blocks) in &ledger.snapshots {
+            let bytes = self.blobs.get(&BlobName::Prefix(live.id.clone(), *lane, *blocks)).await?;
+            let prefix = blocking(move || Prefix::from_bytes(&bytes)).await;
+            kept.push(prefix.map_err(|e| FarmError::Damaged(e.to_string()))?);
+        }
+        let schedule = Arc::clone(&live.schedule);
+        let mut merge = Merge::new(schedule, kept, ledger.commits, ledger.checkpoints);
+        live.arrivals().into_iter().for_each(|arrival| merge.add(arrival));
+        publish(live, &merge);
+        Ok(merge)
+    }
+
+    /// Lets go of sums that were not needed lately, until those of `live` fit beside the rest.
+    async fn make_room(&self, live: &Live) {
+        let mut others: Vec<(Instant, u64, Held)> = Vec::new();
+        for other in self.lives() {
+            if other.id != live.id
+                && let Ok(held) = Arc::clone(&other.merge).try_lock_owned()
+                && let Some(used) = held.as_ref().map(|m| m.used)
+            {
+                others.push((used, other.spec.sums_bytes(), held));
+            }
+        }
+        others.sort_by_key(|(used, ..)| *used);
+        let mut bytes = live.spec.sums_bytes() + others.iter().map(|(_, bytes, _)| bytes).sum::<u64>();
+        for (_, its, mut held) in others {
+            if bytes > self.rules.sums_bytes {
+                *held = None;
+                bytes -= its;
+            }
+        }
+    }
+
+    /// Appends what can be, looks at checkpoints; true when the job is over.
+    pub async fn advance(&self, live: &Arc<Live>) -> Result<bool> {
+        let mut held = self.sums(live).await?;
+        loop {
+            let merge = held.as_mut().expect("loaded above");
+            live.arrivals().into_iter().for_each(|arrival| merge.add(arrival));
+            if let Some(ending) = live.ending()
+                && self.can_end(merge, &ending)
+            {
+                return self.finish(live, held, ending).await.map(|()| true);
+            }
+            match merge.next() {
+                Next::Append(ready) => {
+                    held = self.append(live, held, ready).await?;
+                    held = self.snapshot(live, held).await?;
+                }
+                Next::Look => {
+                    let (back, ending) = self.look(live, held).await?;
+                    held = back;
+                    if let Some(ending) = ending {
+                        return self.finish(live, held, ending).await.map(|()| true);
+                    }
+                }
+                Next::Wait => return Ok(false),
+            }
+        }
+    }
+
+    async fn append(&self, live: &Live, mut held: Held, ready: Vec<Arrival>) -> Result<Held> {
+        let mut sums = Vec::with_capacity(ready.len());
+        let mut bytes = 0;
+        for Arrival { row, sum } in ready {
+            let source = match sum {
+                Some(sum) => Source::Decoded(sum),
+                None => Source::Partial(self.partial(&live.id, &row).await?),
+            };
+            bytes += source.bytes();
+            sums.push((row, source));
+        }
+        let appended = sums.len() as u64;
+        let held = blocking(move || -> Result<Held> {
+            let merge = held.as_mut().expect("loaded by the caller");
+            for (row, source) in sums {
+                let region = merge.schedule.regions()[row.batch.region as usize];
+                let sum = source.decode(region.pixels())?;
+                merge.append(&row, &sum)?;
+            }
+            Ok(held)
+        })
+        .await?;
+        self.counters.appended(appended, bytes);
+        publish(live, held.as_ref().expect("loaded by the caller"));
+        Ok(held)
+    }
+
+    async fn partial(&self, job: &JobId, row: &CommitRow) -> Result<Bytes> {
+        let name = BlobName::Partial(job.clone(), row.batch, row.hash.clone());
+        self.blobs.get(&name).await.map_err(|error| match error {
+            BlobError::Missing(_) => FarmError::Damaged(format!("the sum of {} is lost", row.batch)),
+            other => other.into(),
+        })
+    }
+
+    /// Keeps lanes with many partials as one blob each, then removes those partials.
+    async fn snapshot(&self, live: &Live, mut held: Held) -> Result<Held> {
+        let overdue = held.as_ref().expect("loaded by the caller").overdue(self.rules.partials_kept);
+        for (lane, since) in overdue {
+            let (back, bytes, blocks) = blocking(move || {
+                let prefix = held.as_ref().expect("loaded by the caller").prefix(lane);
+                let (bytes, blocks) = (prefix.to_bytes(), prefix.blocks());
+                (held, bytes, blocks)
+            })
+            .await;
+            held = back;
+            self.blobs.put(&BlobName::Prefix(live.id.clone(), lane, blocks), bytes.into()).await?;
+            self.store.set_snapshot(&live.id, lane, blocks).await?;
+            held.as_mut().expect("loaded by the caller").snapshots.insert(lane, blocks);
+            self.forget_partials(live, lane, since, blocks).await?;
+        }
+        Ok(held)
+    }
+
+    async fn forget_partials(&self, live: &Live, lane: Lane, since: u32, blocks: u32) -> Result<()> {
+        if since > 0 {
+            self.blobs.delete(&BlobName::Prefix(live.id.clone(), lane, since)).await?;
+        }
+        for row in self.store.commits(&live.id, lane, since..blocks).await? {
+            self.blobs.delete(&BlobName::Partial(live.id.clone(), row.batch, row.hash)).await?;
+        }
+        Ok(())
+    }
+}
+
+/// A sum, decoded or not.
+enum Source {
+    Decoded(Sum),
+    Partial(Bytes),
+}
+
+impl Source {
+    fn bytes(&self) -> u64 {
+        match self {
+            Self::Decoded(sum) => super::live::sum_bytes(sum),
+            Self::Partial(bytes) => bytes.len() as u64,
+        }
+    }
+
+    fn decode(self, pixels: usize) -> Result<Sum> {
+        match self {
+            Self::Decoded(sum) => Ok(sum),
+            Self::Partial(bytes) => {
+                let read = exr::read_partial(&bytes, pixels);
+                read.map(|(sum, _)| sum).map_err(|e| FarmError::Damaged(e.to_string()))
+            }
+        }
+    }
+}
+
+/// Lets the world see what is in the picture.
+fn publish(live: &Live, merge: &Merge) {
+    let (progress, manifest) = (merge.progress(), merge.manifest(&live.identity));
+    live.set_view(|view: &mut View| {
+        view.progress = progress;
+        view.manifest = manifest;
+    });
+}
+
+/// Runs work of the processor off the async threads.
+pub async fn blocking<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> T {
+    match tokio::task::spawn_blocking(work).await {
+        Ok(done) => done,
+        Err(error) => match error.try_into_panic() {
+            Ok(panic) => std::panic::resume_unwind(panic),
+            // Only a runtime that is shut down cancels it: nobody waits any more.
+            Err(_) => std::future::pending().await,
+        },
+    }
+}

@@ -1,0 +1,100 @@
+//! A look at the picture: its error, and whether the job goes on.
+
+use super::{
+    Farm,
+    append::{Held, Merge, blocking},
+    error::Result,
+    live::{Ending, Live, Waits},
+};
+use crate::store::row::NewCheckpoint;
+use ovtigre_core::film::error::{ErrorEstimate, estimate};
+use ovtigre_proto::{curve::CurveRow, status::JobState};
+
+impl Farm {
+    /// All lanes are at a checkpoint: its row of the curve is written down. Says how the job ends,
+    /// where it ends here.
+    pub(super) async fn look(&self, live: &Live, held: Held) -> Result<(Held, Option<Ending>)> {
+        let (mut held, found) = measure(live, held).await;
+        let row = self.take_row(live, &mut held, found.as_ref()).await?;
+        let merge = held.as_ref().expect("loaded by the caller");
+        let reached = live.spec.error_target.is_some_and(|target| {
+            row.relative_error_upper.is_some_and(|upper| upper <= target) && has_light(merge)
+        });
+        let done = |reason: &str| Ending {
+            state: JobState::Done,
+            reason: Some(reason.to_owned()),
+            certified: reached,
+            waits: Waits::Not,
+        };
+        let ending = if reached {
+            Some(done("the error target was reached"))
+        } else if merge.is_complete() {
+            Some(done("all samples asked for were drawn"))
+        } else {
+            self.book().reach(&live.id, merge.checkpoints);
+            None
+        };
+        Ok((held, ending))
+    }
+
+    /// A last row of the curve for a picture that ends between two checkpoints.
+    pub(super) async fn last_look(&self, live: &Live, held: Held) -> Result<Held> {
+        let samples = held.as_ref().expect("loaded by the caller").progress().samples;
+        let last = live.view().curve.last().map_or(0, |row| row.samples);
+        if samples.round() <= f64::from(last) {
+            return Ok(held);
+        }
+        let (mut held, found) = measure(live, held).await;
+        self.take_row(live, &mut held, found.as_ref()).await?;
+        Ok(held)
+    }
+
+    async fn take_row(
+        &self,
+        live: &Live,
+        held: &mut Held,
+        found: Option<&ErrorEstimate>,
+    ) -> Result<CurveRow> {
+        let merge = held.as_mut().expect("loaded by the caller");
+        let progress = merge.progress();
+        let wall_seconds = self.job_row(&live.id).await?.run_seconds;
+        let row = CurveRow {
+            samples: progress.samples.round() as u32,
+            wall_seconds,
+            worker_seconds: progress.worker_micros as f64 * 1e-6,
+            rays: progress.rays,
+            rms_error: found.map(|e| e.rms),
+            relative_error: found.map(|e| e.relative),
+            relative_error_upper: found.and_then(|e| e.relative_upper),
+        };
+        merge.checkpoints += 1;
+        let checkpoint = NewCheckpoint { look: merge.checkpoints, row, progress };
+        if let Err(error) = self.store.add_checkpoint(&live.id, checkpoint).await {
+            merge.checkpoints -= 1;
+            return Err(error.into());
+        }
+        live.set_view(|view| view.curve.push(row));
+        Ok(row)
+    }
+}
+
+/// The error of what is appended. An estimate that is not finite is none.
+async fn measure(live: &Live, held: Held) -> (Held, Option<ErrorEstimate>) {
+    let region = live.spec.region;
+    blocking(move || {
+        let merge = held.as_ref().expect("loaded by the caller");
+        let found = estimate(region, &merge.prefixes, merge.checkpoints + 1);
+        let found = found.filter(|e| e.rms.is_finite() && e.relative.is_finite());
+        let found = found.map(|e| ErrorEstimate {
+            relative_upper: e.relative_upper.filter(|upper| upper.is_finite()),
+            ..e
+        });
+        (held, found)
+    })
+    .await
+}
+
+/// Whether any light was found. A picture that is black so far has no spread, and no proof either.
+fn has_light(merge: &Merge) -> bool {
+    merge.prefixes.iter().flatten().any(|prefix| prefix.layer(0).iter().any(|v| *v > 0.0))
+}

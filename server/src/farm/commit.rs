@@ -1,0 +1,117 @@
+//! A batch's sum is brought: checked, kept, counted once.
+
+use super::{
+    Farm,
+    append::blocking,
+    counters::Fate,
+    error::{FarmError, Result},
+    ids::batch_of,
+    live::{Arrival, Live},
+};
+use crate::{
+    blobs::BlobName,
+    store::row::{BatchKey, CommitOutcome, CommitRow, NewCommit},
+};
+use bytes::Bytes;
+use ovtigre_core::film::{batch::Batch, exr, sum::Sum};
+use ovtigre_proto::{
+    id::{BlobId, JobId, LeaseId, WorkerId},
+    lease::Commit,
+};
+use std::time::Duration;
+
+/// Longest time that is believed of one batch.
+const TIME_MAX: Duration = Duration::from_secs(30 * 24 * 3600);
+
+impl Farm {
+    /// The partial EXR of a lease's batch, on which its worker spent `time`. The first sum of a
+    /// batch counts, even after its lease has ended; a further one is compared with it.
+    pub async fn commit(&self, lease: &LeaseId, partial: Bytes, time: Duration) -> Result<Commit> {
+        let (job, key) = batch_of(lease).ok_or_else(|| FarmError::not_found("lease", lease))?;
+        let row = self.store.job(&job).await?.ok_or_else(|| FarmError::not_found("lease", lease))?;
+        let Some(live) = self.live(&job).filter(|_| !row.state.is_over()) else {
+            self.counters.count(Fate::NotNeeded);
+            return Ok(Commit::NotNeeded);
+        };
+        let batch = live.batch(key).ok_or_else(|| FarmError::not_found("lease", lease))?;
+        let (sum, hash) = self.decode(&live, batch, partial.clone()).await?;
+        let name = BlobName::Partial(job.clone(), key, hash.clone());
+        self.blobs.put(&name, partial).await?;
+        let worker = self.book().lease(lease).map(|held| held.row.worker.clone());
+        let micros = time.min(TIME_MAX).as_micros() as u64;
+        let row = CommitRow { batch: key, hash, worker_micros: micros };
+        let new = NewCommit {
+            job: job.clone(),
+            row: row.clone(),
+            worker: worker.clone(),
+            rays_per_second: if micros == 0 { 0.0 } else { sum.rays as f64 / (micros as f64 * 1e-6) },
+        };
+        match self.store.commit(new).await? {
+            CommitOutcome::First => {
+                self.counters.count(Fate::Accepted);
+                self.book().brought(&job, key);
+                self.arrive(&live, row, sum);
+                Ok(Commit::Accepted)
+            }
+            CommitOutcome::Same => {
+                self.counters.count(Fate::Duplicate);
+                Ok(Commit::Duplicate)
+            }
+            CommitOutcome::Differs { kept } => {
+                self.disagree(&job, key, &row.hash, &kept, worker.as_ref());
+                self.blobs.delete(&name).await?;
+                Ok(Commit::NotNeeded)
+            }
+            CommitOutcome::JobOver | CommitOutcome::NoJob => {
+                self.counters.count(Fate::NotNeeded);
+                self.blobs.delete(&name).await?;
+                Ok(Commit::NotNeeded)
+            }
+            CommitOutcome::NeverHandedOut => {
+                self.blobs.delete(&name).await?;
+                Err(FarmError::not_found("lease", lease))
+            }
+        }
+    }
+
+    async fn decode(&self, live: &Live, batch: Batch, partial: Bytes) -> Result<(Sum, BlobId)> {
+        let _turn = self.decoders.acquire().await.map_err(|_| FarmError::Stopping)?;
+        let (job, scene) = (live.id.clone(), live.scene.clone());
+        let method = live.spec.settings.method.name();
+        blocking(move || {
+            let read = exr::read_partial(&partial, batch.region.pixels());
+            let (sum, says) = read.map_err(|e| FarmError::Sum(e.to_string()))?;
+            if sum.batch != batch {
+                return Err(FarmError::Sum(format!("it is of {}, not of {batch}", sum.batch)));
+            }
+            for (what, got, expected) in [
+                ("job", &*says.job, job.as_str()),
+                ("scene", &*says.scene, scene.as_str()),
+                ("method", &*says.method, method),
+            ] {
+                if got != expected {
+                    return Err(FarmError::Sum(format!("its {what} is '{got}', not '{expected}'")));
+                }
+            }
+            if sum.planes.len() != super::spec::LAYERS as usize {
+                return Err(FarmError::Sum(format!("it has {} layers", sum.planes.len())));
+            }
+            let hash = BlobId::of(sum.hash());
+            Ok((sum, hash))
+        })
+        .await
+    }
+
+    /// The sum waits in memory where there is room, else as a blob.
+    fn arrive(&self, live: &Live, row: CommitRow, sum: Sum) {
+        let waiting: u64 = self.lives().iter().map(|live| live.fresh_bytes()).sum();
+        let fits = waiting + super::live::sum_bytes(&sum) <= self.rules.fresh_bytes;
+        live.arrive(Arrival { row, sum: fits.then_some(sum) });
+    }
+
+    fn disagree(&self, job: &JobId, batch: BatchKey, got: &BlobId, kept: &BlobId, worker: Option<&WorkerId>) {
+        self.counters.count(Fate::Disagreeing);
+        let worker = worker.map_or("not known", WorkerId::as_str);
+        tracing::warn!(%job, %batch, %got, %kept, worker, "two sums of one batch differ: the first is kept");
+    }
+}

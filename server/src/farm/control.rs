@@ -1,0 +1,69 @@
+//! A user's changes to a job.
+
+use super::{
+    Farm,
+    book::HandOut,
+    error::{FarmError, Result, fault},
+};
+use crate::store::row::{JobChange, JobRow};
+use ovtigre_proto::{
+    id::JobId,
+    job::JobPatch,
+    status::{JobState, JobStatus},
+};
+
+impl Farm {
+    /// Changes a job, if it still has `version` where one is given.
+    pub async fn patch(&self, id: &JobId, patch: &JobPatch, version: Option<u64>) -> Result<JobStatus> {
+        if let Some(state) = patch.state.filter(|s| !matches!(s, JobState::Paused | JobState::Running)) {
+            let detail = format!("'{}' cannot be asked for: 'paused' or 'running' can", state.name());
+            return Err(FarmError::Patch(vec![fault("/state", detail)]));
+        }
+        loop {
+            let row = self.job_row(id).await?;
+            if version.is_some_and(|version| version != row.version) {
+                return Err(FarmError::Version { current: row.version });
+            }
+            if row.state.is_over() {
+                return Err(FarmError::Over { id: id.clone(), state: row.state });
+            }
+            let change = JobChange {
+                priority: patch.priority.filter(|p| *p != row.priority),
+                state: next_state(&row, patch.state),
+                ..JobChange::default()
+            };
+            let nothing = change.priority.is_none() && change.state.is_none();
+            if nothing || self.store.change_job(id, row.version, change).await? {
+                break;
+            }
+        }
+        let row = self.job_row(id).await?;
+        self.follow(&row);
+        self.status_of(&row).await
+    }
+
+    /// Brings the book up to what the store says.
+    fn follow(&self, row: &JobRow) {
+        let mut book = self.book();
+        if row.state.is_over() {
+            book.remove(&row.id);
+        } else if let Some(entry) = book.job(&row.id) {
+            entry.priority = row.priority;
+            entry.hand_out = if row.state == JobState::Paused { HandOut::Paused } else { HandOut::Yes };
+        }
+        drop(book);
+        if let Some(live) = self.live(&row.id) {
+            live.changed();
+        }
+    }
+}
+
+/// The state that the wish leads to; `None` where the job is in it.
+fn next_state(row: &JobRow, wish: Option<JobState>) -> Option<JobState> {
+    match (row.state, wish?) {
+        (JobState::Queued | JobState::Running, JobState::Paused) => Some(JobState::Paused),
+        (JobState::Paused, JobState::Running) if row.started_at.is_none() => Some(JobState::Queued),
+        (JobState::Paused, JobState::Running) => Some(JobState::Running),
+        _ => None,
+    }
+}

@@ -1,0 +1,101 @@
+//! Why the farm did not do what was asked.
+
+use crate::{blobs::BlobError, store::error::StoreError};
+use ovtigre_proto::{
+    id::{BlobId, JobId},
+    problem::Fault,
+    status::JobState,
+};
+
+/// A request that was not followed.
+#[derive(Debug, thiserror::Error)]
+pub enum FarmError {
+    /// Nothing of that name.
+    #[error("there is no {what} '{id}'")]
+    NotFound {
+        /// Which kind.
+        what: &'static str,
+        /// Which name.
+        id: String,
+    },
+    /// A job that cannot be taken as it is.
+    #[error("the job cannot be taken: {}", said(.0))]
+    Request(Vec<Fault>),
+    /// A change that cannot be made.
+    #[error("the change cannot be made: {}", said(.0))]
+    Patch(Vec<Fault>),
+    /// An uploaded file that cannot be read.
+    #[error("the scene cannot be read: {}", said(.0))]
+    Scene(Vec<Fault>),
+    /// Bytes that are not those they are said to be.
+    #[error("the bytes have the hash {got}, not {named}: send them again")]
+    HashMismatch {
+        /// The name they came under.
+        named: BlobId,
+        /// Their hash.
+        got: BlobId,
+    },
+    /// An upload without end.
+    #[error("the upload is larger than the {limit} bytes that are taken")]
+    TooLarge {
+        /// Bytes at most.
+        limit: u64,
+    },
+    /// A sum that is not that of the lease.
+    #[error("the sum is not that of its lease: {0}")]
+    Sum(String),
+    /// The job is over.
+    #[error("the job '{id}' is {}: it cannot be changed", .state.name())]
+    Over {
+        /// Which.
+        id: JobId,
+        /// How it ended.
+        state: JobState,
+    },
+    /// The job has changed.
+    #[error("the job has changed since: fetch it again; its version is {current} now")]
+    Version {
+        /// Its version.
+        current: u64,
+    },
+    /// An idempotency key that was used for something else.
+    #[error("the idempotency key was used for another request: choose a new one")]
+    KeyTaken,
+    /// No batch came yet.
+    #[error("the job '{0}' has no picture yet: ask again later")]
+    NoPicture(JobId),
+    /// A layer that the picture has not.
+    #[error("the picture has no layer '{0}'")]
+    NoLayer(String),
+    /// The store failed.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// A blob was not read or written.
+    #[error(transparent)]
+    Blob(#[from] BlobError),
+    /// What is kept of a job cannot be used.
+    #[error("what is kept of the job cannot be used: {0}")]
+    Damaged(String),
+    /// The farm is stopping.
+    #[error("the farm is stopping: ask again later")]
+    Stopping,
+}
+
+impl FarmError {
+    /// Nothing of that name.
+    pub fn not_found(what: &'static str, id: impl ToString) -> Self {
+        Self::NotFound { what, id: id.to_string() }
+    }
+}
+
+/// A fault at `pointer` of a document.
+pub fn fault(pointer: impl Into<String>, detail: impl Into<String>) -> Fault {
+    Fault { pointer: pointer.into(), detail: detail.into() }
+}
+
+fn said(faults: &[Fault]) -> String {
+    faults.first().map_or_else(String::new, |fault| fault.detail.clone())
+}
+
+/// What the farm answers.
+pub type Result<T> = std::result::Result<T, FarmError>;

@@ -1,0 +1,114 @@
+//! A farm begins and ends.
+
+use super::{
+    Farm,
+    book::{Entry, HandOut},
+    error::{FarmError, Result},
+    live::{Ending, Live, Waits, held},
+    rules::Rules,
+    scene::Inspect,
+    spec::JobSpec,
+    split::Plan,
+};
+use crate::{
+    blobs::{BlobFolder, Blobs},
+    store::{Store, row::JobRow},
+};
+use ovtigre_proto::status::JobState;
+use std::{
+    num::NonZero,
+    sync::{Arc, Mutex},
+    thread::available_parallelism,
+};
+use tokio::sync::Semaphore;
+
+/// Scenes looked into at a time: each is in memory whole.
+const INSPECTORS: usize = 2;
+
+impl Farm {
+    /// A farm that goes on where the last one over the same store and blobs ended, however it ended.
+    pub async fn open(
+        store: Arc<dyn Store>,
+        blobs: Blobs,
+        inspect: Inspect,
+        rules: Rules,
+    ) -> Result<Arc<Self>> {
+        let processors = available_parallelism().map_or(1, NonZero::get);
+        let farm = Arc::new(Self {
+            store,
+            blobs,
+            rules,
+            counters: super::counters::Counters::default(),
+            stopping: tokio_util::sync::CancellationToken::new(),
+            inspect,
+            ids: super::ids::Ids::new(),
+            tasks: tokio_util::task::TaskTracker::new(),
+            decoders: Semaphore::new(processors),
+            inspectors: Semaphore::new(INSPECTORS),
+            book: Mutex::default(),
+            crew: Mutex::default(),
+            lives: Mutex::default(),
+        });
+        farm.sweep().await?;
+        for row in farm.store.unsettled_jobs().await? {
+            farm.take_up(&row).await?;
+        }
+        farm.tasks.spawn(Arc::clone(&farm).tick());
+        Ok(farm)
+    }
+
+    /// Stops what goes on by itself, waits for what is being written, and closes the store.
+    pub async fn close(&self) {
+        self.stopping.cancel();
+        self.tasks.close();
+        self.tasks.wait().await;
+        self.store.close().await;
+    }
+
+    /// Removes uploads that were cut off, and files of jobs that are over or that are not there.
+    async fn sweep(&self) -> Result<()> {
+        self.blobs.delete_all(&BlobFolder::Incoming).await?;
+        for id in self.blobs.jobs().await? {
+            match self.store.job(&id).await? {
+                None => self.blobs.delete_all(&BlobFolder::Job(id)).await?,
+                Some(row) if row.settled => self.remove_leftovers(&id).await?,
+                Some(_) => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// A job in the store that is not settled goes on.
+    pub(super) async fn take_up(self: &Arc<Self>, row: &JobRow) -> Result<()> {
+        let spec: JobSpec = read_spec(row)?;
+        let curve = self.store.curve(&row.id).await?;
+        let live = Arc::new(Live::new(row, spec, curve));
+        held(&self.lives).insert(row.id.clone(), Arc::clone(&live));
+        if row.state.is_over() {
+            live.end(Ending { state: row.state, reason: None, certified: false, waits: Waits::Not });
+        } else {
+            self.hand_out_from(row, &live).await?;
+        }
+        live.kick.notify_one();
+        self.tasks.spawn(Arc::clone(self).pump(live));
+        Ok(())
+    }
+
+    async fn hand_out_from(&self, row: &JobRow, live: &Live) -> Result<()> {
+        let ledger = self.store.ledger(&row.id).await?;
+        let schedule = Arc::clone(&live.schedule);
+        let plan = Plan::new(schedule, ledger.cursors, ledger.returned, ledger.checkpoints);
+        let hand_out = if row.state == JobState::Paused { HandOut::Paused } else { HandOut::Yes };
+        let settings = live.spec.settings.clone();
+        let entry = Entry::new(row.scene.clone(), settings, plan, row.priority, row.sequence, hand_out);
+        let mut book = self.book();
+        book.add(row.id.clone(), entry);
+        ledger.leases.into_iter().for_each(|lease| book.hold(lease));
+        Ok(())
+    }
+}
+
+/// The document of a job in the store.
+pub fn read_spec(row: &JobRow) -> Result<JobSpec> {
+    serde_json::from_str(&row.spec).map_err(|e| FarmError::Damaged(e.to_string()))
+}

@@ -1,0 +1,229 @@
+//! A job's picture so far, as files.
+
+use super::{
+    Farm,
+    append::blocking,
+    error::{FarmError, Result},
+    live::{Live, Made},
+    open::read_spec,
+};
+use crate::{
+    blobs::BlobName,
+    store::row::{JobRow, Progress},
+};
+use bytes::Bytes;
+use futures::stream::BoxStream;
+use ovtigre_core::film::{
+    develop::{Develop, png},
+    estimate::picture,
+    exr::{Layers, PictureAttributes, read_layers, write_picture},
+    size::Region,
+    sum::Plane,
+};
+use ovtigre_proto::id::JobId;
+use std::{ops::Range, time::Duration};
+
+/// What a picture's files say made them.
+const SOFTWARE: &str = concat!("ovtigre ", env!("CARGO_PKG_VERSION"));
+
+/// A picture's EXR, in memory or kept.
+#[derive(Debug)]
+pub enum ExrFile {
+    /// Made from the sums.
+    Memory(Bytes),
+    /// Of a job that is over.
+    Kept {
+        /// Its name.
+        name: BlobName,
+        /// Its size in bytes.
+        size: u64,
+    },
+}
+
+/// A layer of a picture.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum LayerName {
+    /// The picture itself.
+    Picture,
+    /// Its standard error.
+    Error,
+    /// One of its layers.
+    Named(String),
+}
+
+impl LayerName {
+    /// As a user writes it; nothing is the picture.
+    pub fn parse(text: Option<&str>) -> Self {
+        match text {
+            None | Some("" | "picture") => Self::Picture,
+            Some("error") => Self::Error,
+            Some(name) => Self::Named(name.to_owned()),
+        }
+    }
+}
+
+impl ExrFile {
+    /// Its size in bytes.
+    pub fn size(&self) -> u64 {
+        match self {
+            Self::Memory(bytes) => bytes.len() as u64,
+            Self::Kept { size, .. } => *size,
+        }
+    }
+}
+
+impl Farm {
+    /// The set of batches in the picture so far; `None` where there is no picture yet.
+    pub async fn manifest(&self, id: &JobId) -> Result<Option<String>> {
+        let row = self.job_row(id).await?;
+        match self.live(id).filter(|_| !row.settled) {
+            None => Ok(row.manifest),
+            Some(live) => {
+                let known = live.view().manifest;
+                // After a restart the sums are not in memory yet.
+                if known.is_none() && live.view().progress.batches > 0 {
+                    drop(self.sums(&live).await?);
+                    return Ok(live.view().manifest);
+                }
+                Ok(known)
+            }
+        }
+    }
+
+    /// Waits until the picture is not that of `manifest`, or has its last form, for `time` at most.
+    pub async fn await_change(&self, id: &JobId, manifest: Option<&str>, time: Duration) -> Result<()> {
+        let Some(live) = self.live(id) else { return Ok(()) };
+        let mut changes = live.changes.subscribe();
+        let change = async {
+            while self.live(id).is_some() && self.manifest(id).await?.as_deref() == manifest {
+                if changes.changed().await.is_err() {
+                    break;
+                }
+            }
+            Ok(())
+        };
+        tokio::select! {
+            () = self.stopping.cancelled() => Ok(()),
+            done = tokio::time::timeout(time, change) => done.unwrap_or(Ok(())),
+        }
+    }
+
+    /// The picture so far, and the set of batches in it.
+    pub async fn exr(&self, id: &JobId) -> Result<(String, ExrFile)> {
+        let row = self.job_row(id).await?;
+        if let (true, Some(manifest)) = (row.settled, row.manifest) {
+            let name = BlobName::Result(id.clone());
+            let size = self.blobs.size(&name).await?;
+            return Ok((manifest, ExrFile::Kept { name, size }));
+        }
+        let live = self.live(id).filter(|_| !row.settled).ok_or_else(|| FarmError::NoPicture(id.clone()))?;
+        let made = self.make_exr(&live).await?;
+        Ok((made.manifest, ExrFile::Memory(made.bytes)))
+    }
+
+    /// Some bytes of a picture's file.
+    pub async fn exr_range(&self, file: &ExrFile, range: Range<u64>) -> Result<Bytes> {
+        match file {
+            ExrFile::Memory(bytes) => Ok(bytes.slice(range.start as usize..range.end as usize)),
+            ExrFile::Kept { name, .. } => Ok(self.blobs.get_range(name, range).await?),
+        }
+    }
+
+    /// All bytes of a kept picture, piece by piece.
+    pub async fn exr_stream(
+        &self,
+        name: &BlobName,
+    ) -> Result<BoxStream<'static, std::result::Result<Bytes, crate::blobs::BlobError>>> {
+        Ok(self.blobs.stream(name).await?.1)
+    }
+
+    /// The EXR of what is appended; made once for each set of batches.
+    pub(super) async fn make_exr(&self, live: &Live) -> Result<Made> {
+        let row = self.job_row(&live.id).await?;
+        let held = self.sums(live).await?;
+        let merge = held.as_ref().expect("just read");
+        let manifest = merge.manifest(&live.identity).ok_or_else(|| FarmError::NoPicture(live.id.clone()))?;
+        if let Some(made) = live.made().filter(|made| made.manifest == manifest) {
+            return Ok(made);
+        }
+        let attributes = attributes(&row, live, merge.progress(), manifest.clone());
+        let (size, region) = (live.spec.settings.size, live.spec.region);
+        let bytes = blocking(move || {
+            let picture = picture(size, region, &held.as_ref().expect("just read").prefixes);
+            drop(held);
+            write_picture(&picture, &attributes)
+        })
+        .await;
+        let made = Made { manifest, bytes: bytes.into() };
+        live.set_made(made.clone());
+        Ok(made)
+    }
+
+    /// The picture so far as PNG, and the set of batches in it.
+    pub async fn png(&self, id: &JobId, layer: LayerName, develop: Develop) -> Result<(String, Bytes)> {
+        let row = self.job_row(id).await?;
+        let spec = read_spec(&row)?;
+        if let LayerName::Named(name) = layer {
+            return Err(FarmError::NoLayer(name));
+        }
+        if layer == LayerName::Error && spec.settings.replicates < 2 {
+            return Err(FarmError::NoLayer("error".to_owned()));
+        }
+        let region = spec.region;
+        if let (true, Some(manifest)) = (row.settled, &row.manifest) {
+            let exr = self.blobs.get(&BlobName::Result(id.clone())).await?;
+            let png = blocking(move || develop_kept(&exr, region, &layer, &develop)).await?;
+            return Ok((manifest.clone(), png));
+        }
+        let live = self.live(id).filter(|_| !row.settled).ok_or_else(|| FarmError::NoPicture(id.clone()))?;
+        let held = self.sums(&live).await?;
+        let manifest = held.as_ref().and_then(|merge| merge.manifest(&live.identity));
+        let manifest = manifest.ok_or_else(|| FarmError::NoPicture(id.clone()))?;
+        let size = spec.settings.size;
+        let bytes = blocking(move || {
+            let picture = picture(size, region, &held.as_ref().expect("just read").prefixes);
+            drop(held);
+            let plane = match layer {
+                LayerName::Error => picture.error,
+                _ => picture.planes.into_iter().next(),
+            };
+            plane.map(|plane| png(region, &plane, &develop))
+        })
+        .await;
+        let bytes = bytes.ok_or_else(|| FarmError::NoLayer("error".to_owned()))?;
+        Ok((manifest, bytes.into()))
+    }
+}
+
+fn develop_kept(exr: &[u8], region: Region, layer: &LayerName, develop: &Develop) -> Result<Bytes> {
+    let layers = read_layers(exr).map_err(|e| FarmError::Damaged(e.to_string()))?;
+    let prefix = if *layer == LayerName::Error { "error." } else { "" };
+    let plane = plane(&layers, region, prefix).ok_or_else(|| {
+        FarmError::Damaged("the kept picture has other channels or another size".to_owned())
+    })?;
+    Ok(png(region, &plane, develop).into())
+}
+
+fn plane(layers: &Layers, region: Region, prefix: &str) -> Option<Plane> {
+    let channel = |c| layers.channels.get(&format!("{prefix}{c}")).filter(|v| v.len() == region.pixels());
+    let (r, g, b) = (channel("R")?, channel("G")?, channel("B")?);
+    Some((0..region.pixels()).map(|i| [r[i], g[i], b[i]]).collect())
+}
+
+/// What a picture says of itself. All of it follows from job and set of batches, so that a file made
+/// twice says the same.
+fn attributes(row: &JobRow, live: &Live, progress: Progress, manifest: String) -> PictureAttributes {
+    let begun = row.started_at.unwrap_or(row.created_at);
+    PictureAttributes {
+        job: live.id.to_string(),
+        scene: live.scene.to_string(),
+        samples: progress.samples,
+        seed: live.spec.settings.seed,
+        method: live.spec.settings.method.name().to_owned(),
+        paths: live.spec.paths.clone(),
+        manifest,
+        render_seconds: progress.worker_micros as f64 * 1e-6,
+        software: SOFTWARE.to_owned(),
+        capture_date: begun.to_zoned(jiff::tz::TimeZone::UTC).strftime("%Y:%m:%d %H:%M:%S").to_string(),
+    }
+}

@@ -1,0 +1,107 @@
+//! What happens by itself, now and then: leases run out, workers are lost, deadlines pass.
+
+use super::{
+    Farm,
+    counters::Fate,
+    error::{FarmError, Result},
+    live::{Ending, Live, Waits},
+};
+use ovtigre_proto::status::JobState;
+use std::{sync::Arc, time::Duration};
+
+/// How long a job rests after its store or its files failed.
+const REST: Duration = Duration::from_secs(1);
+
+impl Farm {
+    /// Leases that ran out go back, silent workers are lost, jobs whose time is over end.
+    pub async fn reap(&self) -> Result<()> {
+        for released in self.store.expire().await? {
+            self.counters.count(Fate::Expired);
+            self.book().take_back(&released.lease);
+            if let Some(live) = self.live(&released.lease.job) {
+                live.changed();
+            }
+            self.judge(&released, "its worker was not heard of in time").await?;
+        }
+        for worker in self.store.lose_workers(self.rules.silence).await? {
+            tracing::warn!(%worker, "worker is lost");
+            self.crew().remove(&worker);
+        }
+        for live in self.lives() {
+            if let Some(seconds) = live.spec.seconds
+                && live.ending().is_none()
+                && self.store.job(&live.id).await?.is_some_and(|row| row.run_seconds >= seconds)
+            {
+                live.end(Ending {
+                    state: JobState::Done,
+                    reason: Some("the time was over".to_owned()),
+                    certified: false,
+                    waits: Waits::ForPicture,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    pub(super) async fn tick(self: Arc<Self>) {
+        let mut beat = tokio::time::interval(self.rules.tick);
+        beat.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
+        let mut hour = tokio::time::interval(Duration::from_secs(3600));
+        loop {
+            let done = tokio::select! {
+                () = self.stopping.cancelled() => return,
+                _ = beat.tick() => self.reap().await,
+                _ = hour.tick() => self.store.forget_keys(self.rules.keys).await.map_err(FarmError::from),
+            };
+            if let Err(error) = done {
+                tracing::error!(%error, "looking after leases and deadlines failed");
+            }
+        }
+    }
+
+    /// Appends what comes until the job is over.
+    pub(super) async fn pump(self: Arc<Self>, live: Arc<Live>) {
+        loop {
+            tokio::select! {
+                () = self.stopping.cancelled() => return,
+                () = live.kick.notified() => {}
+            }
+            if self.live(&live.id).is_none_or(|now| !Arc::ptr_eq(&now, &live)) {
+                return;
+            }
+            match self.advance(&live).await {
+                Ok(true) => return,
+                Ok(false) => {}
+                Err(error) => {
+                    // What is in memory may be half done: it is built again from what is kept.
+                    *live.merge.lock().await = None;
+                    if self.give_up(&live, error).await {
+                        return;
+                    }
+                }
+            }
+        }
+    }
+
+    /// After an error: fails a job that cannot be appended to, or lets it rest. True when it is over.
+    async fn give_up(&self, live: &Live, error: FarmError) -> bool {
+        if self.store.job(&live.id).await.is_ok_and(|row| row.is_none()) {
+            return true;
+        }
+        tracing::error!(job = %live.id, %error, "appending failed");
+        if matches!(error, FarmError::Damaged(_)) {
+            let failed = self.settle_without_picture(live, error.to_string()).await;
+            match failed {
+                Ok(()) => return true,
+                Err(error) => tracing::error!(job = %live.id, %error, "the job could not be failed"),
+            }
+        }
+        tokio::select! {
+            () = self.stopping.cancelled() => true,
+            () = tokio::time::sleep(REST) => {
+                live.kick.notify_one();
+                false
+            }
+        }
+    }
+}

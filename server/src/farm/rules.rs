@@ -1,0 +1,57 @@
+//! The farm's numbers.
+
+use std::time::Duration;
+
+/// How long, how many, how much.
+#[derive(Clone, Copy, Debug)]
+pub struct Rules {
+    /// A lease ends so long after it was given or renewed.
+    pub lease: Duration,
+    /// A worker that was not heard of for so long is lost.
+    pub silence: Duration,
+    /// A worker's beat is written down at most so often.
+    pub note_beat: Duration,
+    /// Shortest time between a worker's beats; it grows with the number of workers.
+    pub beat: Duration,
+    /// Beats a second of all workers together, about at most.
+    pub beats_per_second: f64,
+    /// Leases that ran out, workers lost and deadlines are looked for so often.
+    pub tick: Duration,
+    /// Bytes of sums in memory, of all jobs together; a job that needs more is refused.
+    pub sums_bytes: u64,
+    /// Bytes of decoded sums that wait for their append in memory; others wait as blobs.
+    pub fresh_bytes: u64,
+    /// A lane's blocks since its last blob of sums, at most: so many partials are kept.
+    pub partials_kept: u32,
+    /// Batches given to a worker at a time.
+    pub wants_max: u32,
+    /// A batch that failed on so many workers fails its job.
+    pub failing_workers: u32,
+    /// A batch that failed so often fails its job, however few the workers.
+    pub failures: u32,
+    /// Idempotency keys are remembered so long.
+    pub keys: Duration,
+    /// Largest upload.
+    pub scene_bytes: u64,
+}
+
+impl Default for Rules {
+    fn default() -> Self {
+        Self {
+            lease: Duration::from_secs(10),
+            silence: Duration::from_secs(15),
+            note_beat: Duration::from_secs(3),
+            beat: Duration::from_millis(200),
+            beats_per_second: 200.0,
+            tick: Duration::from_millis(250),
+            sums_bytes: 4 << 30,
+            fresh_bytes: 256 << 20,
+            partials_kept: 8,
+            wants_max: 64,
+            failing_workers: 3,
+            failures: 5,
+            keys: Duration::from_secs(24 * 3600),
+            scene_bytes: 2 << 30,
+        }
+    }
+}

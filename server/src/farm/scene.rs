@@ -1,0 +1,135 @@
+//! Uploaded files: named by their hash, looked into once.
+
+use super::{
+    Farm,
+    append::blocking,
+    error::{FarmError, Result, fault},
+};
+use crate::blobs::{BlobError, BlobName, Upload};
+use bytes::Bytes;
+use futures::stream::BoxStream;
+use ovtigre_proto::{
+    id::BlobId,
+    problem::Fault,
+    scene::{SceneContent, SceneReport},
+};
+use std::{fmt, sync::Arc};
+
+/// Looks into a file's bytes: what is in it, or what is wrong and where.
+#[derive(Clone)]
+pub struct Inspect(Arc<dyn Fn(Bytes) -> std::result::Result<SceneContent, Fault> + Send + Sync>);
+
+impl Inspect {
+    /// By `look`, which is called off the async threads.
+    pub fn new(
+        look: impl Fn(Bytes) -> std::result::Result<SceneContent, Fault> + Send + Sync + 'static,
+    ) -> Self {
+        Self(Arc::new(look))
+    }
+}
+
+impl fmt::Debug for Inspect {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Inspect")
+    }
+}
+
+/// A file that is being uploaded.
+#[derive(Debug)]
+pub struct Incoming {
+    upload: Upload,
+    hasher: blake3::Hasher,
+    bytes: u64,
+    limit: u64,
+}
+
+impl Incoming {
+    /// The next piece.
+    pub async fn write(&mut self, piece: Bytes) -> Result<()> {
+        self.bytes += piece.len() as u64;
+        if self.bytes > self.limit {
+            return Err(FarmError::TooLarge { limit: self.limit });
+        }
+        self.hasher.update(&piece);
+        Ok(self.upload.write(piece).await?)
+    }
+
+    /// Forgets it.
+    pub async fn abort(self) {
+        if let Err(error) = self.upload.abort().await {
+            tracing::warn!(%error, "an upload was not removed");
+        }
+    }
+}
+
+/// Whether an uploaded file is new.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Novelty {
+    /// It was not there.
+    New,
+    /// It was there.
+    Known,
+}
+
+impl Farm {
+    /// Begins an upload.
+    pub async fn receive(&self) -> Result<Incoming> {
+        let upload = self.blobs.upload(self.ids.text(16)).await?;
+        Ok(Incoming { upload, hasher: blake3::Hasher::new(), bytes: 0, limit: self.rules.scene_bytes })
+    }
+
+    /// Ends an upload: checks its name, where it has one, and looks into it.
+    pub async fn take_in(
+        &self,
+        incoming: Incoming,
+        named: Option<&BlobId>,
+    ) -> Result<(SceneReport, Novelty)> {
+        let id = BlobId::of(incoming.hasher.finalize().into());
+        if let Some(named) = named.filter(|named| **named != id) {
+            incoming.abort().await;
+            return Err(FarmError::HashMismatch { named: named.clone(), got: id });
+        }
+        if let Some(row) = self.store.scene(&id).await? {
+            incoming.abort().await;
+            return Ok((row.report, Novelty::Known));
+        }
+        if incoming.bytes == 0 {
+            incoming.abort().await;
+            return Err(FarmError::Scene(vec![fault("", "the file is empty")]));
+        }
+        let (name, bytes) = (BlobName::Scene(id.clone()), incoming.bytes);
+        incoming.upload.finish(&name).await?;
+        let content = match self.look_into(&name).await {
+            Ok(content) => content,
+            Err(error) => {
+                self.blobs.delete(&name).await?;
+                return Err(error);
+            }
+        };
+        let report = SceneReport { id, bytes, content };
+        self.store.add_scene(report.clone()).await?;
+        Ok((report, Novelty::New))
+    }
+
+    async fn look_into(&self, name: &BlobName) -> Result<SceneContent> {
+        let _turn = self.inspectors.acquire().await.map_err(|_| FarmError::Stopping)?;
+        let bytes = self.blobs.get(name).await?;
+        let inspect = self.inspect.clone();
+        blocking(move || (inspect.0)(bytes)).await.map_err(|fault| FarmError::Scene(vec![fault]))
+    }
+
+    /// What is in an uploaded file.
+    pub async fn scene(&self, id: &BlobId) -> Result<SceneReport> {
+        let row = self.store.scene(id).await?;
+        row.map(|row| row.report).ok_or_else(|| FarmError::not_found("scene", id))
+    }
+
+    /// An uploaded file's size and bytes.
+    pub async fn scene_bytes(
+        &self,
+        id: &BlobId,
+    ) -> Result<(u64, BoxStream<'static, std::result::Result<Bytes, BlobError>>)> {
+        self.scene(id).await?;
+        Ok(self.blobs.stream(&BlobName::Scene(id.clone())).await?)
+    }
+}

@@ -1,0 +1,62 @@
+//! A job, resolved: what is kept of it in the store's `spec`.
+
+use ovtigre_core::{
+    film::{schedule::Schedule, size::Region},
+    settings::Settings,
+};
+use ovtigre_proto::{id::BlobId, job::JobRequest};
+use serde::{Deserialize, Serialize};
+
+/// Layers of a picture, itself included.
+pub const LAYERS: u32 = 1;
+
+/// A job with every default resolved.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct JobSpec {
+    /// What was asked for.
+    pub request: JobRequest,
+    /// What is rendered.
+    pub settings: Settings,
+    /// Pixels that are rendered.
+    pub region: Region,
+    /// Samples a pixel in each replicate, at most.
+    pub samples: u32,
+    /// Relative error to stop at.
+    pub error_target: Option<f64>,
+    /// Seconds of run time to stop after.
+    pub seconds: Option<f64>,
+    /// The path expression.
+    pub paths: String,
+    /// Why the method was chosen.
+    pub method_reason: String,
+    /// What the scene lacked or could not be read, and what was done about it.
+    pub warnings: Vec<String>,
+}
+
+impl JobSpec {
+    /// Its batches.
+    pub fn schedule(&self) -> Schedule {
+        Schedule::new(self.region, LAYERS, self.settings.replicates, self.samples)
+    }
+
+    /// Samples a pixel at most, over all replicates.
+    pub fn samples_asked(&self) -> u32 {
+        self.samples.saturating_mul(self.settings.replicates)
+    }
+
+    /// Bytes of its sums in memory: three f64 a pixel, layer and replicate.
+    pub fn sums_bytes(&self) -> u64 {
+        self.region.pixels() as u64 * u64::from(LAYERS) * u64::from(self.settings.replicates) * 24
+    }
+
+    /// Hash of all that a sum depends on beside its batch.
+    pub fn identity(&self, scene: &BlobId) -> blake3::Hash {
+        let mut hasher = blake3::Hasher::new();
+        hasher.update(scene.as_str().as_bytes());
+        hasher.update(&serde_json::to_vec(&self.settings).expect("settings are plain data"));
+        for n in [self.region.x, self.region.y, self.region.width, self.region.height] {
+            hasher.update(&n.to_le_bytes());
+        }
+        hasher.finalize()
+    }
+}

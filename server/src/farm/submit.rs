@@ -1,0 +1,301 @@
+//! A request becomes a job: checked, every default resolved.
+
+use super::{
+    Farm,
+    error::{FarmError, Result, fault},
+    rules::Rules,
+    spec::JobSpec,
+};
+use crate::store::row::{Added, IdempotencyKey, NewJob};
+use ovtigre_core::{
+    film::size::{Region, Size},
+    settings::{CameraChoice, Environment, EnvironmentSource, Lens, Method, Settings},
+};
+use ovtigre_proto::{
+    id::BlobId,
+    job::{JobRequest, MethodRequest, REPLICATES_DEFAULT, SAMPLES_DEFAULT, WIDTH_DEFAULT},
+    pair::EnvironmentRequest,
+    problem::Fault,
+    scene::{SceneContent, SceneContents, SceneReport},
+    status::JobStatus,
+};
+use std::sync::Arc;
+
+/// The only path expression of this version: the whole rendering equation.
+const FULL: &str = "L(D|S)*E";
+/// Samples a pixel of a job, at most.
+const SAMPLES_MAX: u32 = 1 << 22;
+/// Replicates of a job, at most.
+const REPLICATES_MAX: u32 = 256;
+/// Longest name.
+const NAME_MAX: usize = 200;
+/// Longest idempotency key.
+const KEY_MAX: usize = 255;
+/// Width over height where a camera does not say.
+const ASPECT_DEFAULT: f64 = 16.0 / 9.0;
+
+impl Farm {
+    /// Checks a request; what it would become, or all its faults.
+    pub async fn check(&self, request: JobRequest) -> Result<JobSpec> {
+        let scene = request.scene.clone();
+        let scene = scene.ok_or_else(|| FarmError::Request(vec![fault("/scene", "'scene' is required")]))?;
+        let contents = match self.upload_at("/scene", &scene).await?.content {
+            SceneContent::Scene(contents) => contents,
+            SceneContent::Environment { .. } => {
+                let detail =
+                    format!("'{scene}' is an image: give a scene here, and the image as 'environment'");
+                return Err(FarmError::Request(vec![fault("/scene", detail)]));
+            }
+        };
+        if let Some(EnvironmentRequest::Image(id)) = &request.environment
+            && let SceneContent::Scene(_) = self.upload_at("/environment", id).await?.content
+        {
+            let detail = format!("'{id}' is a scene: give an uploaded image here");
+            return Err(FarmError::Request(vec![fault("/environment", detail)]));
+        }
+        resolve(request, &contents, &self.rules).map_err(FarmError::Request)
+    }
+
+    async fn upload_at(&self, pointer: &str, id: &BlobId) -> Result<SceneReport> {
+        match self.store.scene(id).await? {
+            Some(row) => Ok(row.report),
+            None => {
+                let detail = format!("'{id}' was not uploaded: PUT its bytes to /v1/scenes/{id} first");
+                Err(FarmError::Request(vec![fault(pointer, detail)]))
+            }
+        }
+    }
+
+    /// Takes a job. The same request under the same key is taken once.
+    pub async fn submit(self: &Arc<Self>, request: JobRequest, key: Option<String>) -> Result<JobStatus> {
+        if key.as_ref().is_some_and(|key| key.is_empty() || key.len() > KEY_MAX) {
+            let detail = format!("the idempotency key has 1 to {KEY_MAX} bytes");
+            return Err(FarmError::Request(vec![fault("", detail)]));
+        }
+        let asked = serde_json::to_vec(&request).map_err(|e| FarmError::Damaged(e.to_string()))?;
+        let key =
+            key.map(|key| IdempotencyKey { key, fingerprint: blake3::hash(&asked).to_hex().to_string() });
+        let spec = self.check(request).await?;
+        let id = self.ids.job();
+        let scene = spec.request.scene.clone().expect("checked: a scene is there");
+        let new = NewJob {
+            id: id.clone(),
+            name: spec.request.name.clone().unwrap_or_else(|| scene.as_str()[..12].to_owned()),
+            scene,
+            priority: spec.request.priority.unwrap_or(0),
+            spec: serde_json::to_string(&spec).map_err(|e| FarmError::Damaged(e.to_string()))?,
+            regions: spec.schedule().regions().len() as u32,
+            replicates: spec.settings.replicates,
+        };
+        match self.store.add_job(new, key).await? {
+            Added::New => {
+                let row = self.job_row(&id).await?;
+                tracing::info!(job = %id, name = row.name, "job taken");
+                self.take_up(&row).await?;
+                self.status_of(&row).await
+            }
+            Added::Before(id) => self.status(&id).await,
+            Added::KeyTaken => Err(FarmError::KeyTaken),
+        }
+    }
+}
+
+/// A request with every default resolved, or all its faults.
+pub fn resolve(
+    request: JobRequest,
+    scene: &SceneContents,
+    rules: &Rules,
+) -> std::result::Result<JobSpec, Vec<Fault>> {
+    let mut faults = Vec::new();
+    let mut note = |pointer: &str, detail: String| faults.push(fault(pointer, detail));
+    unsupported(&request, &mut note);
+    numbers(&request, &mut note);
+    let camera = camera(&request, scene).unwrap_or_else(|detail| {
+        note("/camera", detail);
+        CameraChoice::Framed
+    });
+    let size = request.size.unwrap_or_else(|| default_size(scene, camera));
+    if size.width == 0 || size.height == 0 || size.width.max(size.height) > Size::SIDE_MAX {
+        note("/size", format!("each side is 1 to {} pixels", Size::SIDE_MAX));
+    }
+    let region = request.region.unwrap_or(size.frame());
+    if !region.is_in(size) {
+        note("/region", format!("the region {region} does not lie in the frame of {size}"));
+    }
+    let samples = request.samples.unwrap_or(SAMPLES_DEFAULT);
+    let replicates = request.replicates.unwrap_or(REPLICATES_DEFAULT.min(samples));
+    if samples < replicates {
+        let detail = format!(
+            "{samples} samples cannot be split over {replicates} replicates: ask for more, or for fewer replicates"
+        );
+        note("/samples", detail);
+    }
+    if request.error.is_some() && replicates < 3 {
+        note("/replicates", "an error target needs 3 replicates or more: fewer have no interval".to_owned());
+    }
+    let lens = lens(&request).unwrap_or_else(|(pointer, detail)| {
+        note(pointer, detail);
+        None
+    });
+    if !faults.is_empty() {
+        return Err(faults);
+    }
+    let spec = JobSpec {
+        settings: Settings {
+            size,
+            camera,
+            method: Method::Path,
+            bounces: request.bounces,
+            lens,
+            environment: environment(&request),
+            shadows: request.shadows.unwrap_or_default(),
+            seed: request.seed.unwrap_or(0),
+            replicates,
+        },
+        region,
+        samples: samples / replicates,
+        error_target: request.error,
+        seconds: request.seconds,
+        paths: FULL.to_owned(),
+        method_reason: match request.method {
+            Some(MethodRequest::Path) => "asked for".to_owned(),
+            _ => "samples the whole rendering equation from the eye, with next event".to_owned(),
+        },
+        warnings: warnings(scene, camera, samples, replicates),
+        request,
+    };
+    fits(&spec, rules).map(|()| spec)
+}
+
+/// What this version does not render yet.
+fn unsupported(request: &JobRequest, note: &mut impl FnMut(&str, String)) {
+    let full = |text: &str| text.split_whitespace().collect::<String>() == FULL;
+    if request.paths.as_deref().is_some_and(|text| !full(text)) {
+        note("/paths", format!("only '{FULL}' is supported yet: leave 'paths' out"));
+    }
+    match request.preset.as_deref() {
+        None | Some("full") => {}
+        Some("phong" | "whitted" | "cook" | "radiosity") => {
+            note("/preset", "only 'full' is supported yet: leave 'preset' out".to_owned());
+        }
+        Some(name) => note("/preset", format!("there is no preset '{name}': 'full' is one")),
+    }
+    if !matches!(request.method, None | Some(MethodRequest::Auto | MethodRequest::Path)) {
+        note("/method", "only 'path' is supported yet: leave 'method' out".to_owned());
+    }
+    if !request.layers.is_empty() {
+        note("/layers", "layers are not supported yet: leave 'layers' out".to_owned());
+    }
+}
+
+fn numbers(request: &JobRequest, note: &mut impl FnMut(&str, String)) {
+    let positive = |x: f64| x.is_finite() && x > 0.0;
+    if request.samples.is_some_and(|n| n == 0 || n > SAMPLES_MAX) {
+        note("/samples", format!("samples are 1 to {SAMPLES_MAX}"));
+    }
+    if request.replicates.is_some_and(|n| n == 0 || n > REPLICATES_MAX) {
+        note("/replicates", format!("replicates are 1 to {REPLICATES_MAX}"));
+    }
+    if request.error.is_some_and(|e| !positive(e)) {
+        note("/error", "the relative error to stop at is positive, such as 0.01".to_owned());
+    }
+    if request.seconds.is_some_and(|s| !positive(s)) {
+        note("/seconds", "the run time to stop after is positive".to_owned());
+    }
+    if request.environment_rotation.is_some_and(|d| !d.is_finite()) {
+        note("/environment_rotation", "the rotation is a finite number of degrees".to_owned());
+    }
+    if request.environment_rotation.is_some_and(|d| d != 0.0) && request.environment.is_none() {
+        note("/environment_rotation", "there is no 'environment' to rotate".to_owned());
+    }
+    if let Some(EnvironmentRequest::Uniform(rgb)) = &request.environment
+        && !rgb.iter().all(|c| c.is_finite() && *c >= 0.0)
+    {
+        note("/environment", "a radiance has three finite numbers that are not negative".to_owned());
+    }
+    if request.name.as_ref().is_some_and(|name| name.is_empty() || name.len() > NAME_MAX) {
+        note("/name", format!("a name has 1 to {NAME_MAX} bytes"));
+    }
+}
+
+/// A camera by its name, else by its number; the first, else one that frames the scene.
+fn camera(request: &JobRequest, scene: &SceneContents) -> std::result::Result<CameraChoice, String> {
+    let Some(wanted) = &request.camera else {
+        return Ok(if scene.cameras.is_empty() { CameraChoice::Framed } else { CameraChoice::Index(0) });
+    };
+    let named = scene.cameras.iter().position(|name| name == wanted);
+    let numbered = || wanted.parse().ok().filter(|n: &usize| *n < scene.cameras.len());
+    match named.or_else(numbered) {
+        Some(n) => Ok(CameraChoice::Index(n as u32)),
+        None if scene.cameras.is_empty() => Err(format!(
+            "the scene has no camera '{wanted}', and no other: leave 'camera' out to have it framed"
+        )),
+        None => Err(format!("the scene has no camera '{wanted}', but: {}", scene.cameras.join(", "))),
+    }
+}
+
+fn default_size(scene: &SceneContents, _camera: CameraChoice) -> Size {
+    let aspect = scene.aspect_ratio.filter(|a| a.is_finite() && *a > 0.0).unwrap_or(ASPECT_DEFAULT);
+    let height = (f64::from(WIDTH_DEFAULT) / aspect).round().clamp(1.0, f64::from(Size::SIDE_MAX));
+    Size { width: WIDTH_DEFAULT, height: height as u32 }
+}
+
+type At<T> = std::result::Result<T, (&'static str, String)>;
+
+fn lens(request: &JobRequest) -> At<Option<Lens>> {
+    let positive = |x: f64| x.is_finite() && x > 0.0;
+    match (request.lens_radius, request.focus_distance) {
+        (None | Some(0.0), None) => Ok(None),
+        (Some(radius), _) if !(radius == 0.0 || positive(radius)) => {
+            Err(("/lens_radius", "the lens' radius is a number of metres, 0 for a pinhole".to_owned()))
+        }
+        (_, Some(distance)) if !positive(distance) => {
+            Err(("/focus_distance", "the distance in focus is a positive number of metres".to_owned()))
+        }
+        (None | Some(0.0), Some(_)) => Ok(None),
+        (Some(_), None) => {
+            Err(("/focus_distance", "a lens needs a distance in focus: give 'focus_distance'".to_owned()))
+        }
+        (Some(radius), Some(focus_distance)) => Ok(Some(Lens { radius, focus_distance })),
+    }
+}
+
+fn environment(request: &JobRequest) -> Option<Environment> {
+    let source = match request.environment.as_ref()? {
+        EnvironmentRequest::Uniform(rgb) => EnvironmentSource::Uniform(*rgb),
+        EnvironmentRequest::Image(id) => EnvironmentSource::Image(id.to_string()),
+    };
+    Some(Environment { source, rotation_degrees: request.environment_rotation.unwrap_or(0.0) })
+}
+
+fn warnings(scene: &SceneContents, camera: CameraChoice, samples: u32, replicates: u32) -> Vec<String> {
+    let mut warnings = Vec::new();
+    if camera == CameraChoice::Framed {
+        warnings.push("the scene has no camera: it is framed".to_owned());
+    }
+    if samples % replicates != 0 {
+        let drawn = samples / replicates * replicates;
+        warnings.push(format!(
+            "{samples} samples are not a multiple of {replicates} replicates: {drawn} are drawn"
+        ));
+    }
+    warnings.extend(scene.warnings.iter().map(|w| {
+        if w.pointer.is_empty() { w.detail.clone() } else { format!("{}: {}", w.pointer, w.detail) }
+    }));
+    warnings
+}
+
+fn fits(spec: &JobSpec, rules: &Rules) -> std::result::Result<(), Vec<Fault>> {
+    let (needs, has) = (spec.sums_bytes(), rules.sums_bytes);
+    if needs <= has {
+        return Ok(());
+    }
+    let Region { width, height, .. } = spec.region;
+    let detail = format!(
+        "the sums of {width}x{height} pixels in {} replicates need {} MiB, and this farm has {} MiB: ask for a smaller picture, a region of it, or fewer replicates",
+        spec.settings.replicates,
+        needs >> 20,
+        has >> 20
+    );
+    Err(vec![fault("/size", detail)])
+}

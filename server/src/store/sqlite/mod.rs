@@ -1,0 +1,215 @@
+//! The store in one file: SQLite, one writer, many readers.
+
+mod column;
+mod commit;
+mod job;
+mod ledger;
+mod worker;
+mod writer;
+
+use super::{
+    Store,
+    error::{Result, StoreError},
+    row::{
+        Added, Claim, CommitOutcome, CommitRow, Counts, IdempotencyKey, JobChange, JobFilter, JobRow, Lane,
+        Ledger, NewCheckpoint, NewCommit, NewJob, Released, SceneRow, WorkerRow,
+    },
+};
+use ovtigre_proto::{
+    curve::CurveRow,
+    id::{BlobId, JobId, LeaseId, WorkerId},
+    lease::WorkerJoin,
+    scene::SceneReport,
+    status::WorkerState,
+};
+use sqlx::{
+    ConnectOptions as _, SqlitePool,
+    pool::PoolConnection,
+    sqlite::{
+        Sqlite as Driver, SqliteConnectOptions, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous,
+    },
+};
+use std::{ops::Range, path::Path, time::Duration};
+
+/// Readers at a time.
+const READERS: u32 = 4;
+
+/// A store in a file. Durable: write-ahead log, synced at each commit.
+#[derive(Debug)]
+pub struct Sqlite {
+    writer: writer::Writer,
+    readers: SqlitePool,
+}
+
+impl Sqlite {
+    /// Opens the file, makes it where it is not there, and brings its tables up to date.
+    pub async fn open(file: &Path) -> Result<Self> {
+        let options = SqliteConnectOptions::new()
+            .filename(file)
+            .create_if_missing(true)
+            .journal_mode(SqliteJournalMode::Wal)
+            .synchronous(SqliteSynchronous::Full)
+            .busy_timeout(Duration::from_secs(10))
+            .pragma("journal_size_limit", "67108864");
+        let mut connection = options.connect().await?;
+        sqlx::migrate!("./migrations/sqlite").run(&mut connection).await?;
+        let readers = SqlitePoolOptions::new()
+            .max_connections(READERS)
+            .connect_with(options.create_if_missing(false).read_only(true))
+            .await?;
+        Ok(Self { writer: writer::Writer::start(connection), readers })
+    }
+
+    async fn reader(&self) -> Result<PoolConnection<Driver>> {
+        self.readers.acquire().await.map_err(|error| match error {
+            sqlx::Error::PoolClosed => StoreError::Closed,
+            other => other.into(),
+        })
+    }
+}
+
+#[async_trait::async_trait]
+impl Store for Sqlite {
+    async fn add_scene(&self, report: SceneReport) -> Result<()> {
+        self.writer.write(|db| Box::pin(job::add_scene(db, report))).await
+    }
+
+    async fn scene(&self, id: &BlobId) -> Result<Option<SceneRow>> {
+        job::scene(&mut *self.reader().await?, id).await
+    }
+
+    async fn add_job(&self, job: NewJob, key: Option<IdempotencyKey>) -> Result<Added> {
+        self.writer.write(|db| Box::pin(job::add(db, job, key))).await
+    }
+
+    async fn job(&self, id: &JobId) -> Result<Option<JobRow>> {
+        job::get(&mut *self.reader().await?, id).await
+    }
+
+    async fn jobs(&self, filter: JobFilter) -> Result<Vec<JobRow>> {
+        job::list(&mut *self.reader().await?, filter).await
+    }
+
+    async fn unsettled_jobs(&self) -> Result<Vec<JobRow>> {
+        job::unsettled(&mut *self.reader().await?).await
+    }
+
+    async fn change_job(&self, id: &JobId, version: u64, change: JobChange) -> Result<bool> {
+        let id = id.clone();
+        self.writer
+            .write(move |db| Box::pin(async move { job::change(db, &id, version, change).await }))
+            .await
+    }
+
+    async fn remove_job(&self, id: &JobId) -> Result<bool> {
+        let id = id.clone();
+        self.writer.write(move |db| Box::pin(async move { job::remove(db, &id).await })).await
+    }
+
+    async fn ledger(&self, job: &JobId) -> Result<Ledger> {
+        use sqlx::Connection as _;
+        let mut reader = self.reader().await?;
+        let mut snapshot = reader.begin().await?;
+        ledger::read(&mut snapshot, job).await
+    }
+
+    async fn claim(&self, claims: Vec<Claim>, time: Duration) -> Result<Vec<bool>> {
+        self.writer.write(move |db| Box::pin(ledger::claim(db, claims, time))).await
+    }
+
+    async fn renew(&self, worker: &WorkerId, leases: Vec<LeaseId>, time: Duration) -> Result<Vec<LeaseId>> {
+        let worker = worker.clone();
+        self.writer
+            .write(move |db| Box::pin(async move { ledger::renew(db, &worker, leases, time).await }))
+            .await
+    }
+
+    async fn release(&self, lease: &LeaseId, failure: Option<String>) -> Result<Option<Released>> {
+        let lease = lease.clone();
+        self.writer.write(move |db| Box::pin(async move { ledger::release(db, &lease, failure).await })).await
+    }
+
+    async fn expire(&self) -> Result<Vec<Released>> {
+        if !ledger::any_expired(&mut *self.reader().await?).await? {
+            return Ok(Vec::new());
+        }
+        self.writer.write(|db| Box::pin(ledger::expire(db))).await
+    }
+
+    async fn commit(&self, commit: NewCommit) -> Result<CommitOutcome> {
+        self.writer.write(|db| Box::pin(commit::commit(db, commit))).await
+    }
+
+    async fn commits(&self, job: &JobId, lane: Lane, blocks: Range<u32>) -> Result<Vec<CommitRow>> {
+        ledger::commits(&mut *self.reader().await?, job, lane, blocks).await
+    }
+
+    async fn set_snapshot(&self, job: &JobId, lane: Lane, blocks: u32) -> Result<()> {
+        let job = job.clone();
+        self.writer
+            .write(move |db| Box::pin(async move { ledger::set_snapshot(db, &job, lane, blocks).await }))
+            .await
+    }
+
+    async fn add_checkpoint(&self, job: &JobId, checkpoint: NewCheckpoint) -> Result<()> {
+        let job = job.clone();
+        self.writer
+            .write(move |db| Box::pin(async move { commit::add_checkpoint(db, &job, checkpoint).await }))
+            .await
+    }
+
+    async fn curve(&self, job: &JobId) -> Result<Vec<CurveRow>> {
+        commit::curve(&mut *self.reader().await?, job).await
+    }
+
+    async fn add_worker(&self, id: &WorkerId, join: WorkerJoin) -> Result<()> {
+        let id = id.clone();
+        self.writer.write(move |db| Box::pin(async move { worker::add(db, &id, join).await })).await
+    }
+
+    async fn see_worker(&self, id: &WorkerId, state: WorkerState) -> Result<bool> {
+        let id = id.clone();
+        self.writer.write(move |db| Box::pin(async move { worker::see(db, &id, state).await })).await
+    }
+
+    async fn set_worker_state(&self, id: &WorkerId, state: WorkerState) -> Result<bool> {
+        let id = id.clone();
+        self.writer.write(move |db| Box::pin(async move { worker::set_state(db, &id, state).await })).await
+    }
+
+    async fn worker(&self, id: &WorkerId) -> Result<Option<WorkerRow>> {
+        worker::get(&mut *self.reader().await?, id).await
+    }
+
+    async fn workers(&self, before: Option<i64>, limit: u32) -> Result<Vec<(i64, WorkerRow)>> {
+        worker::list(&mut *self.reader().await?, before, limit).await
+    }
+
+    async fn lose_workers(&self, time: Duration) -> Result<Vec<WorkerId>> {
+        if !worker::any_silent(&mut *self.reader().await?, time).await? {
+            return Ok(Vec::new());
+        }
+        self.writer.write(move |db| Box::pin(worker::lose(db, time))).await
+    }
+
+    async fn workers_of(&self, job: &JobId) -> Result<u32> {
+        ledger::workers_of(&mut *self.reader().await?, job).await
+    }
+
+    async fn forget_keys(&self, age: Duration) -> Result<()> {
+        self.writer.write(move |db| Box::pin(worker::forget_keys(db, age))).await
+    }
+
+    async fn counts(&self) -> Result<Counts> {
+        worker::counts(&mut *self.reader().await?).await
+    }
+
+    async fn ping(&self) -> Result<()> {
+        column::now(&mut *self.reader().await?).await.map(|_| ())
+    }
+
+    async fn close(&self) {
+        self.writer.close().await;
+        self.readers.close().await;
+    }
+}

@@ -1,0 +1,132 @@
+//! The one writer: whatever waits while a transaction is made durable goes into the next, together.
+
+use crate::store::error::{Result, StoreError};
+use futures::future::BoxFuture;
+use sqlx::{Connection as _, SqliteConnection};
+use std::sync::{Mutex, PoisonError};
+use tokio::{
+    sync::{mpsc, oneshot},
+    task::JoinHandle,
+};
+
+/// Changes in one transaction, at most.
+const GROUP_MAX: usize = 256;
+
+/// Tells the caller what became of its change, once it is durable or the group failed.
+type Tell = Box<dyn FnOnce(Result<()>) + Send>;
+/// A change: whether it is to be kept, and who is told.
+type Change = Box<dyn for<'c> FnOnce(&'c mut SqliteConnection) -> BoxFuture<'c, (Keep, Tell)> + Send>;
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Keep {
+    Yes,
+    No,
+}
+
+/// Where changes are handed in.
+#[derive(Debug)]
+pub(super) struct Writer {
+    changes: Mutex<Option<mpsc::Sender<Change>>>,
+    task: Mutex<Option<JoinHandle<()>>>,
+}
+
+impl Writer {
+    /// Writes over `connection` until it is closed.
+    pub(super) fn start(connection: SqliteConnection) -> Self {
+        let (changes, waiting) = mpsc::channel(4 * GROUP_MAX);
+        let task = tokio::spawn(write_all(connection, waiting));
+        Self { changes: Mutex::new(Some(changes)), task: Mutex::new(Some(task)) }
+    }
+
+    /// Applies `change` whole or not at all; returns when it is durable.
+    pub(super) async fn write<T, F>(&self, change: F) -> Result<T>
+    where
+        T: Send + 'static,
+        F: for<'c> FnOnce(&'c mut SqliteConnection) -> BoxFuture<'c, Result<T>> + Send + 'static,
+    {
+        let (tell, told) = oneshot::channel();
+        let change: Change = Box::new(move |connection| {
+            Box::pin(async move {
+                let result = change(connection).await;
+                let keep = if result.is_ok() { Keep::Yes } else { Keep::No };
+                let tell: Tell = Box::new(move |durable| {
+                    // A caller that went away does not hear it; the change stands all the same.
+                    let _ = tell.send(result.and_then(|value| durable.map(|()| value)));
+                });
+                (keep, tell)
+            })
+        });
+        let changes = self.changes.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        changes.ok_or(StoreError::Closed)?.send(change).await.map_err(|_| StoreError::Closed)?;
+        told.await.map_err(|_| StoreError::Closed)?
+    }
+
+    /// Takes no more changes, waits for those under way, and closes the connection.
+    pub(super) async fn close(&self) {
+        drop(self.changes.lock().unwrap_or_else(PoisonError::into_inner).take());
+        let task = self.task.lock().unwrap_or_else(PoisonError::into_inner).take();
+        if let Some(task) = task
+            && let Err(error) = task.await
+        {
+            tracing::error!(%error, "the database's writer ended early");
+        }
+    }
+}
+
+async fn write_all(mut connection: SqliteConnection, mut waiting: mpsc::Receiver<Change>) {
+    while let Some(first) = waiting.recv().await {
+        let mut group = vec![first];
+        while group.len() < GROUP_MAX
+            && let Ok(next) = waiting.try_recv()
+        {
+            group.push(next);
+        }
+        write_group(&mut connection, group).await;
+    }
+    if let Err(error) = connection.close().await {
+        tracing::warn!(%error, "the database did not close cleanly");
+    }
+}
+
+/// One transaction; a change that fails is taken back alone, by its savepoint.
+async fn write_group(connection: &mut SqliteConnection, group: Vec<Change>) {
+    let mut tells: Vec<Tell> = Vec::with_capacity(group.len());
+    let mut written = run(connection, "BEGIN IMMEDIATE").await;
+    if written.is_err() {
+        // Outside a transaction a change would stand whatever its caller is told: none is tried.
+        tracing::error!("the database is locked by another program, or broken");
+        return;
+    }
+    for change in group {
+        if written.is_err() {
+            continue;
+        }
+        written = run(connection, "SAVEPOINT change").await;
+        if written.is_err() {
+            continue;
+        }
+        let (keep, tell) = change(connection).await;
+        tells.push(tell);
+        if keep == Keep::No {
+            written = run(connection, "ROLLBACK TO change").await;
+        }
+        if written.is_ok() {
+            written = run(connection, "RELEASE change").await;
+        }
+    }
+    if written.is_ok() {
+        written = run(connection, "COMMIT").await;
+    }
+    if let Err(error) = &written {
+        tracing::error!(%error, changes = tells.len(), "a group of changes was not written");
+        // Fails where no transaction was begun or it is rolled back already.
+        let _ = run(connection, "ROLLBACK").await;
+    }
+    for tell in tells {
+        tell(written.as_ref().map_or_else(|error| Err(StoreError::Commit(error.to_string())), |()| Ok(())));
+    }
+}
+
+async fn run(connection: &mut SqliteConnection, sql: &'static str) -> std::result::Result<(), sqlx::Error> {
+    sqlx::query(sql).execute(connection).await.map(|_| ())
+}
