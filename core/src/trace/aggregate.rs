@@ -157,7 +157,7 @@ impl Aggregate {
 
 /// What is done with the hits of one ray.
 trait Visitor {
-    /// Hits farther than this do not matter any more; finite.
+    /// Hits farther than this do not matter any more.
     fn limit(&self) -> f32;
     /// Takes a hit with 0 < t ≤ `limit`; breaks where no other matters.
     fn hit(&mut self, hit: Hit) -> ControlFlow<()>;
@@ -173,7 +173,7 @@ struct Best<A> {
 impl<A: Fn(&Hit) -> bool> Visitor for Best<A> {
     #[inline(always)]
     fn limit(&self) -> f32 {
-        self.hit.t.min(f32::MAX)
+        self.hit.t
     }
 
     #[inline(always)]
@@ -195,7 +195,7 @@ struct Any<A> {
 impl<A: Fn(&Hit) -> bool> Visitor for Any<A> {
     #[inline(always)]
     fn limit(&self) -> f32 {
-        self.t_max.min(f32::MAX)
+        self.t_max
     }
 
     #[inline(always)]
@@ -214,7 +214,7 @@ struct Product<P> {
 impl<P: Fn(&Hit) -> f32> Visitor for Product<P> {
     #[inline(always)]
     fn limit(&self) -> f32 {
-        self.t_max.min(f32::MAX)
+        self.t_max
     }
 
     #[inline(always)]

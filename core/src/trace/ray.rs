@@ -4,8 +4,8 @@ use glam::{Vec2, Vec3};
 
 /// The points `origin + t · direction` with 0 < t < `t_max`.
 ///
-/// A ray hits nothing where its origin is not finite or farther than 2⁶² from zero on an axis, where its
-/// direction is zero or not finite, or where `t_max` is NaN or not positive.
+/// A ray hits nothing where its origin is not finite or its coordinates add up to more than 2⁶², where its direction is
+/// zero or not finite, or where `t_max` is NaN or not positive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
     /// Where the ray starts, in world space.
