@@ -104,11 +104,12 @@ impl Aggregate {
 
     #[inline(always)]
     fn visit<L: Lanes, O: Ordering>(&self, ray: &Ray, visitor: &mut impl Visitor) -> ControlFlow<()> {
-        // Written so that NaN is refused too.
-        if !(ray.t_max > 0.0) {
+        if ray.t_max.is_nan() || ray.t_max <= 0.0 {
             return ControlFlow::Continue(());
         }
-        let Some(prepared) = Prepared::new(ray.origin, ray.direction) else { return ControlFlow::Continue(()) };
+        let Some(prepared) = Prepared::new(ray.origin, ray.direction) else {
+            return ControlFlow::Continue(());
+        };
         if let Some(only) = self.only {
             return self.visit_mesh::<L, O>(only, &prepared, visitor);
         }
@@ -200,7 +201,11 @@ impl<A: Fn(&Hit) -> bool> Visitor for Any<A> {
 
     #[inline(always)]
     fn hit(&mut self, hit: Hit) -> ControlFlow<()> {
-        if hit.t < self.t_max && (self.accept)(&hit) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        if hit.t < self.t_max && (self.accept)(&hit) {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
     }
 }
 

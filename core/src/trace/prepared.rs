@@ -49,10 +49,12 @@ impl Prepared {
         }
         let inverse = [inverse(x), inverse(y), inverse(z)];
         let longest = longest * outward;
-        let axes = match longest {
-            l if x.abs() == l => [1, 2, 0],
-            l if y.abs() == l => [2, 0, 1],
-            _ => [0, 1, 2],
+        let axes = if x.abs() >= longest {
+            [1, 2, 0]
+        } else if y.abs() >= longest {
+            [2, 0, 1]
+        } else {
+            [0, 1, 2]
         };
         let (origin, direction) = ([origin.x, origin.y, origin.z], [x, y, z]);
         let depth = inverse[axes[2]];
@@ -95,6 +97,7 @@ fn sign(component: f32) -> usize {
 }
 
 #[cfg(test)]
+#[expect(clippy::float_cmp, reason = "these values are exact")]
 mod tests {
     use super::*;
 
@@ -105,7 +108,7 @@ mod tests {
             let ray = Prepared::new(Vec3::ZERO, Vec3::new(0.0, -length, 0.0)).unwrap();
             let rest = 2.0_f32.powi((exponent + 126).min(0) + (exponent - 126).max(0));
             assert_eq!(ray.direction, [0.0, -rest, 0.0], "2^{exponent}");
-            assert_eq!(ray.outward(rest / length), 1.0 / length * rest);
+            assert_eq!((ray.outward * length, ray.outward * ray.inward), (rest, 1.0));
             assert_eq!(ray.axes[2], 1);
         }
     }

@@ -1,6 +1,7 @@
 //! A ray and what it hits.
 
 use glam::{Vec2, Vec3};
+use std::cmp::Ordering;
 
 /// The points `origin + t · direction` with 0 < t < `t_max`.
 ///
@@ -42,7 +43,10 @@ impl Hit {
     /// which they are found.
     #[inline]
     pub(super) fn precedes(&self, other: &Hit) -> bool {
-        self.t < other.t
-            || (self.t == other.t && (self.instance, self.triangle) < (other.instance, other.triangle))
+        match self.t.partial_cmp(&other.t) {
+            Some(Ordering::Less) => true,
+            Some(Ordering::Equal) => (self.instance, self.triangle) < (other.instance, other.triangle),
+            _ => false,
+        }
     }
 }

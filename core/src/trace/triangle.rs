@@ -116,7 +116,13 @@ impl Block {
         let normal = (b - a).cross(c - a);
         // The nearest vertex loses least to cancellation.
         let (aa, bb, cc) = (a.length_squared(), b.length_squared(), c.length_squared());
-        let nearest = if aa <= bb && aa <= cc { a } else if bb <= cc { b } else { c };
+        let nearest = if aa <= bb && aa <= cc {
+            a
+        } else if bb <= cc {
+            b
+        } else {
+            c
+        };
         let direction = double(ray.direction[0], ray.direction[1], ray.direction[2]);
         (normal.dot(nearest) / normal.dot(direction)) as f32
     }
@@ -151,6 +157,7 @@ fn settle_zeros(mask: u32, xy: &[Row; 6], edges: &mut [Row; 3]) -> u32 {
 }
 
 #[cfg(test)]
+#[expect(clippy::float_cmp, reason = "these values are exact")]
 mod tests {
     use super::super::lanes::{Native, portable::Portable};
     use super::*;
