@@ -54,6 +54,12 @@ pub struct JobRequest {
     /// Further pictures, `NAME=EXPR` each.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub layers: Vec<String>,
+    /// Only these techniques of `bidirectional`: pairs `s,t` of light and eye vertices, with `;` between.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub strategies: Option<String>,
+    /// How the techniques of a path are weighed against each other.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub weights: Option<WeightsRequest>,
     /// Longest path in scattering events.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bounces: Option<u32>,
@@ -63,6 +69,9 @@ pub struct JobRequest {
     /// Distance in focus in metres.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub focus_distance: Option<f64>,
+    /// Seconds of the scene's animation at which the shutter opens and closes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shutter: Option<[f64; 2]>,
     /// Light from infinitely far.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub environment: Option<EnvironmentRequest>,
@@ -102,6 +111,20 @@ pub enum MethodRequest {
     Photon,
     /// Finite elements.
     Radiosity,
+}
+
+/// How the techniques of a path are weighed against each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum WeightsRequest {
+    /// In proportion to their densities.
+    Balance,
+    /// In proportion to the squares of their densities.
+    Power,
+    /// All alike.
+    Uniform,
+    /// One technique has it all.
+    Single,
 }
 
 /// A change to a job; what is left out stays.
