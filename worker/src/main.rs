@@ -1,2 +1,45 @@
 //! The program `ovtigre-worker`.
-fn main() {}
+
+use clap::Parser;
+use ovtigre_worker::{flags::WorkFlags, leave::Bell, processor, run::run};
+use std::{
+    io::{Write as _, stderr},
+    process::{ExitCode, id},
+};
+
+/// Works for an ovtigre farm: leases batches, renders them and sends back their sums.
+#[derive(Parser)]
+#[command(version)]
+struct Line {
+    #[command(flatten)]
+    work: WorkFlags,
+    /// What is logged to stderr, such as `info` or `ovtigre_worker=debug`.
+    #[arg(long, value_name = "FILTER", default_value = "info")]
+    log: String,
+}
+
+fn main() -> ExitCode {
+    match processor::check().map_err(anyhow::Error::msg).and_then(|()| work(&Line::parse())) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            writeln!(stderr(), "error: {error:#}").ok();
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn work(line: &Line) -> anyhow::Result<()> {
+    tracing_subscriber::fmt().with_env_filter(&line.log).with_writer(stderr).init();
+    let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?;
+    let result = runtime.block_on(async {
+        let bell = Bell::default();
+        tokio::spawn(bell.clone().ring_on_signals());
+        if line.work.until_stdin_closes {
+            tokio::spawn(bell.clone().ring_when_stdin_closes());
+        }
+        run(line.work.config(u64::from(id())), bell).await
+    });
+    // A scene that is being prepared, or standard input, may keep a thread busy.
+    runtime.shutdown_background();
+    Ok(result?)
+}

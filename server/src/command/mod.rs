@@ -1,0 +1,32 @@
+//! The command line: one file a command, and what they share.
+
+pub(crate) mod exit;
+pub(crate) mod line;
+pub(crate) mod terminal;
+
+mod cancel;
+mod check;
+mod compare;
+mod embedded;
+mod farm_flags;
+mod fetch;
+mod follow;
+mod interrupt;
+mod job_flags;
+mod local_workers;
+mod output;
+mod pause;
+mod progress;
+mod render;
+mod report;
+mod resume;
+mod scene_file;
+mod serve;
+mod status;
+mod submission;
+mod submit;
+mod table;
+mod watch;
+mod words;
+mod work;
+mod workers;

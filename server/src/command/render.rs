@@ -1,0 +1,90 @@
+//! `ovtigre render`: the main job in one line.
+
+use super::{
+    embedded::{Embedded, Plan},
+    exit::{CommandError, Outcome},
+    farm_flags,
+    follow::{Workers, until_over},
+    interrupt::Interrupt,
+    job_flags::JobFlags,
+    local_workers::WorkerLog,
+    progress::{Others, Progress},
+    submission::Submission,
+    terminal,
+};
+use clap::Args;
+use std::{num::NonZeroUsize, path::PathBuf};
+
+/// Render a scene.
+#[derive(Args, Debug)]
+pub(crate) struct Render {
+    /// Scene to render: .glb, or .gltf with its files beside it.
+    #[arg(value_name = "SCENE")]
+    scene: PathBuf,
+    #[command(flatten)]
+    job: JobFlags,
+    /// Worker processes of the farm that is started.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    workers: u32,
+    /// Threads of each worker process [default: the cores shared out].
+    #[arg(long, value_name = "N")]
+    threads: Option<NonZeroUsize>,
+    /// Folder in which the farm keeps its memory [default: a temporary one].
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+    /// Render on this farm instead of starting one.
+    #[arg(long, value_name = "URL", conflicts_with_all = ["workers", "threads", "data"])]
+    server: Option<String>,
+    /// Show the log of farm and workers instead of a bar.
+    #[arg(short, long)]
+    verbose: bool,
+}
+
+impl Render {
+    /// Renders.
+    pub(crate) async fn run(self) -> Outcome {
+        terminal::log(if self.verbose { "info" } else { "error" });
+        let interrupt = Interrupt::listen();
+        let submission = Submission::read(&self.scene, self.job).await?;
+        let others = if self.verbose { Others::Log } else { Others::None };
+        if let Some(server) = &self.server {
+            return carry_out(server, &submission, others, &interrupt, Workers::Theirs).await;
+        }
+        let plan = Plan {
+            workers: self.workers,
+            threads: self.threads,
+            data: self.data,
+            log: if self.verbose { WorkerLog::Shown } else { WorkerLog::Kept },
+        };
+        let farm = Embedded::start(plan).await?;
+        let workers = Workers::Ours(&farm.workers);
+        let outcome = carry_out(&farm.address(), &submission, others, &interrupt, workers).await;
+        tokio::select! {
+            () = farm.stop() => {}
+            () = interrupt.twice() => {}
+        }
+        outcome
+    }
+}
+
+async fn carry_out(
+    server: &str,
+    submission: &Submission,
+    others: Others,
+    interrupt: &Interrupt,
+    workers: Workers<'_>,
+) -> Outcome {
+    let client = farm_flags::client(server)?;
+    let job = tokio::select! {
+        job = submission.submit(&client) => job?,
+        () = interrupt.once() => return Err(CommandError::stopped("stopped before the job was submitted")),
+    };
+    let mut progress = Progress::new(others);
+    progress.show(&job);
+    let status = until_over(&client, &job.id, &mut progress, interrupt, workers).await?;
+    drop(progress);
+    tokio::select! {
+        collected = submission.collect(&client, &status) => collected,
+        () = interrupt.twice() => Err(CommandError::stopped("left before the picture was written")),
+    }
+}

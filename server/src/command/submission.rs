@@ -1,0 +1,115 @@
+//! From flags to a job on a farm, and from a job to files.
+
+use super::{
+    exit::{CommandError, Outcome},
+    job_flags::JobFlags,
+    output::{Output, folder_of},
+    report, scene_file, terminal, words,
+};
+use ovtigre_proto::{
+    client::{farm::Client, file::Upload},
+    job::JobRequest,
+    pair::{EnvironmentRequest, radiance},
+    status::{JobState, JobStatus},
+};
+use std::{
+    path::{Path, PathBuf},
+    time::SystemTime,
+};
+
+/// What is read and checked on this side before anything is started.
+#[derive(Debug)]
+pub(crate) struct Submission {
+    scene: Upload,
+    environment: Option<Environment>,
+    flags: JobFlags,
+    name: String,
+    pub(crate) output: Output,
+}
+
+#[derive(Debug)]
+enum Environment {
+    Uniform([f32; 3]),
+    Image(Upload),
+}
+
+impl Submission {
+    /// Reads the scene and all that the flags name.
+    pub(crate) async fn read(scene: &Path, flags: JobFlags) -> Outcome<Self> {
+        let output = Output::new(flags.output.as_deref(), scene)?;
+        if let Some(report) = &flags.report {
+            folder_of(report)?;
+        }
+        let environment = match &flags.environment {
+            None => None,
+            Some(text) => Some(environment(text).await?),
+        };
+        let name = scene.file_stem().unwrap_or(scene.as_os_str()).to_string_lossy().into_owned();
+        Ok(Self { scene: scene_file::read(scene).await?, environment, flags, name, output })
+    }
+
+    /// Uploads what the farm does not have, and submits.
+    pub(crate) async fn submit(&self, client: &Client) -> Outcome<JobStatus> {
+        client.upload(&self.scene).await?;
+        let environment = match &self.environment {
+            None => None,
+            Some(Environment::Uniform(radiance)) => Some(EnvironmentRequest::Uniform(*radiance)),
+            Some(Environment::Image(image)) => {
+                client.upload(image).await?;
+                Some(EnvironmentRequest::Image(image.id().clone()))
+            }
+        };
+        let request = self.flags.request(self.name.clone(), self.scene.id().clone(), environment);
+        Ok(client.submit(&request, &key(&request)).await?)
+    }
+
+    /// Fetches the picture and the report of a job that is over, and says how it ended.
+    pub(crate) async fn collect(&self, client: &Client, status: &JobStatus) -> Outcome {
+        if status.state == JobState::Failed {
+            let reason = status.reason.as_deref().unwrap_or("the farm does not say why");
+            return Err(CommandError::failed(format!("the job failed: {reason}")));
+        }
+        if status.samples_done <= 0.0 {
+            return Err(CommandError::stopped("stopped before the first sample: there is no picture"));
+        }
+        self.output.fetch(client, &status.id).await?;
+        if let Some(path) = &self.flags.report {
+            report::write(client, status, path).await?;
+        }
+        terminal::result(&words::list(&[
+            self.output.png.as_ref().unwrap_or(&self.output.exr).display().to_string(),
+            words::samples(status),
+            words::error(status.error.as_ref()),
+            words::duration(status.wall_seconds),
+        ]));
+        match status.state {
+            JobState::Done => Ok(()),
+            _ => Err(CommandError::stopped("stopped before done; the picture so far is written")),
+        }
+    }
+
+    /// Whether there is something to do when the job is over.
+    pub(crate) fn wants_files(&self) -> bool {
+        self.flags.output.is_some() || self.flags.report.is_some()
+    }
+}
+
+async fn environment(text: &str) -> Outcome<Environment> {
+    if let Some(radiance) = radiance(text) {
+        return Ok(Environment::Uniform(radiance));
+    }
+    let path = PathBuf::from(text);
+    if text.contains(',') && !path.exists() {
+        let wrong = format!("environment '{text}' is neither a file nor three numbers R,G,B from 0 on");
+        return Err(CommandError::wrong(wrong));
+    }
+    Ok(Environment::Image(Upload::file(path).await?))
+}
+
+/// Tells this submission from any other, and not from its own repetition.
+fn key(request: &JobRequest) -> String {
+    let now = SystemTime::UNIX_EPOCH.elapsed().unwrap_or_default().as_nanos();
+    let text = serde_json::to_string(request).expect("a request is plain data");
+    let hash = blake3::hash(format!("{}-{now}-{text}", std::process::id()).as_bytes());
+    hash.to_hex().as_str()[..32].to_owned()
+}

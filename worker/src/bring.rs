@@ -1,0 +1,58 @@
+//! Sums on their way to the farm.
+
+use crate::desk::Desk;
+use bytes::Bytes;
+use ovtigre_proto::{
+    client::farm::Client,
+    id::LeaseId,
+    lease::{FailureKind, LeaseFailure},
+};
+use std::sync::Arc;
+
+/// A rendered batch.
+#[derive(Clone, Debug)]
+pub struct Rendered {
+    /// Whose.
+    pub lease: LeaseId,
+    /// Its partial EXR.
+    pub sum: Bytes,
+    /// Time spent on it in seconds.
+    pub seconds: f64,
+}
+
+/// Brings a sum until the farm has taken or refused it; takes its lease off the desk.
+pub async fn bring(client: Client, desk: Arc<Desk>, rendered: Rendered) {
+    let Rendered { lease, sum, seconds } = rendered;
+    let mut backoff = client.backoff();
+    loop {
+        match client.bring(&lease, sum.clone(), seconds).await {
+            Ok(committed) => {
+                tracing::debug!(%lease, commit = ?committed.commit, seconds, "brought");
+                break;
+            }
+            Err(error) if error.may_pass() => {
+                tracing::warn!(%lease, %error, "bringing a sum again");
+                tokio::time::sleep(backoff.delay()).await;
+            }
+            Err(error) => {
+                tracing::warn!(%lease, %error, "the farm did not take a sum");
+                // A lease that is gone needs no giving back.
+                if !matches!(error.status(), Some(404 | 409 | 410)) {
+                    give_back(&client, &lease, FailureKind::Worker, error.to_string()).await;
+                }
+                break;
+            }
+        }
+    }
+    desk.remove(&lease);
+}
+
+/// Gives a batch back; where that fails the lease ends by itself.
+pub async fn give_back(client: &Client, lease: &LeaseId, kind: FailureKind, reason: String) {
+    if kind != FailureKind::HandedBack {
+        tracing::warn!(%lease, reason, "a batch failed");
+    }
+    if let Err(error) = client.give_back(lease, &LeaseFailure { reason, kind }).await {
+        tracing::debug!(%lease, %error, "a batch could not be given back");
+    }
+}

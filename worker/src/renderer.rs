@@ -1,0 +1,60 @@
+//! What a worker needs of a renderer: a border at which tests put a simpler one.
+
+use ovtigre_core::{
+    film::{batch::Batch, sum::Sum},
+    render::{batch::render, prepare::prepare, profile::NUMERIC_PROFILE, progress::Progress},
+    scene::Scene,
+    settings::Settings,
+};
+use std::sync::Arc;
+
+/// Turns scenes and batches into sums. Called on the threads of the worker's pool.
+pub trait Renderer: Send + Sync + 'static {
+    /// A scene that is ready to be rendered.
+    type Scene: Send + Sync + 'static;
+
+    /// Class of processor whose bits its sums have.
+    fn instruction_set(&self) -> &'static str;
+
+    /// Reads an uploaded file and makes it ready. The error is one line for the job's owner.
+    fn prepare(
+        &self,
+        scene: Arc<[u8]>,
+        environment: Option<&[u8]>,
+        settings: &Settings,
+    ) -> Result<Self::Scene, String>;
+
+    /// The sum of a batch; `None` where it was stopped.
+    fn render(
+        &self,
+        scene: &Self::Scene,
+        settings: &Settings,
+        batch: Batch,
+        progress: &Progress,
+    ) -> Option<Sum>;
+}
+
+/// The renderer of this build.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Core;
+
+impl Renderer for Core {
+    type Scene = Scene;
+
+    fn instruction_set(&self) -> &'static str {
+        NUMERIC_PROFILE
+    }
+
+    fn prepare(
+        &self,
+        scene: Arc<[u8]>,
+        environment: Option<&[u8]>,
+        settings: &Settings,
+    ) -> Result<Scene, String> {
+        prepare(scene, environment, settings).map_err(|e| e.to_string())
+    }
+
+    fn render(&self, scene: &Scene, settings: &Settings, batch: Batch, progress: &Progress) -> Option<Sum> {
+        render(scene, settings, batch, progress).ok()
+    }
+}
