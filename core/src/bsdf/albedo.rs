@@ -68,21 +68,14 @@ pub struct Means {
 impl Row {
     /// Of an α within 1e-3..=1.
     pub fn of(alpha: f32) -> Self {
-        let first = SPECULAR_BELOW.sqrt();
-        let (index, fraction) = locate((alpha.sqrt() - first) / (1.0 - first), ROWS);
+        let (index, fraction) = locate(row_of(alpha), ROWS);
         Self { index, fraction }
     }
 
     /// M and B of a direction with `w.z` > 0 and stretched length σ.
     #[inline]
     pub fn missing_and_grazing(self, w: Vec3, alpha2: f32, stretched: f32) -> (f32, f32) {
-        let across = w.x * w.x + w.y * w.y;
-        let x = w.z / stretched;
-        // 1 − x without the difference. One root and two selections: a branch here is often mispredicted.
-        let rest = alpha2 * across / (stretched * (stretched + w.z));
-        let root = (0.5 * x.min(rest)).sqrt();
-        let t = if x < rest { root } else { 1.0 - root };
-        let (missing, correction) = self.at(t);
+        let (missing, correction) = self.at(column_of(w, alpha2, stretched));
         let grazing = (1.0 - missing) * fifth_power((1.0 - w.z).max(0.0)) + correction;
         (missing, grazing.clamp(0.0, 1.0 - missing))
     }
@@ -111,9 +104,25 @@ fn lerp(a: [f32; 2], b: [f32; 2], t: f32) -> [f32; 2] {
     [a[0] + (b[0] - a[0]) * t, a[1] + (b[1] - a[1]) * t]
 }
 
+/// The place among the rows of a table, 0..=1, of a roughness.
+pub(super) fn row_of(alpha: f32) -> f32 {
+    let first = SPECULAR_BELOW.sqrt();
+    (alpha.sqrt() - first) / (1.0 - first)
+}
+
+/// The place among the columns of a table, 0..=1, of a direction with `w.z` > 0 and stretched length σ.
+#[inline]
+pub(super) fn column_of(w: Vec3, alpha2: f32, stretched: f32) -> f32 {
+    let x = w.z / stretched;
+    // 1 − x without the difference. One root and two selections: a branch here is often mispredicted.
+    let rest = alpha2 * (w.x * w.x + w.y * w.y) / (stretched * (stretched + w.z));
+    let root = (0.5 * x.min(rest)).sqrt();
+    if x < rest { root } else { 1.0 - root }
+}
+
 /// The cell of `n` uniform nodes over 0..=1, and where in it.
 #[inline]
-fn locate(position: f32, n: usize) -> (usize, f32) {
+pub(super) fn locate(position: f32, n: usize) -> (usize, f32) {
     let scaled = position.clamp(0.0, 1.0) * (n - 1) as f32;
     let i = (scaled as usize).min(n - 2);
     (i, scaled - i as f32)
@@ -123,91 +132,39 @@ fn locate(position: f32, n: usize) -> (usize, f32) {
 mod tests {
     use super::*;
     use crate::bsdf::ggx::Ggx;
-    use std::f64::consts::PI;
+    use crate::bsdf::tests::oracle::{alpha_of, cosine_of, hemisphere, passed, visible_mean};
 
-    /// E and the albedo of (1 − v·h)⁵ at a cosine: the mean of G₂/G₁ over visible normals, by the
-    /// midpoint rule on the spherical cap, refined towards its edge, where few normals send light
-    /// below the horizon.
-    fn integrate(mu: f64, alpha: f64, n: usize) -> (f64, f64) {
-        let sin = (1.0 - mu * mu).sqrt();
-        let stretched = (mu * mu + alpha * alpha * sin * sin).sqrt();
-        let (sx, sz) = (alpha * sin / stretched, mu / stretched);
-        let turns: Vec<(f64, f64)> = (0..n).map(|j| libm::sincos(PI * (j as f64 + 0.5) / n as f64)).collect();
-        let (mut even, mut grazing) = (0.0, 0.0);
-        for i in 0..n {
-            let left = 1.0 - (i as f64 + 0.5) / n as f64;
-            let z = left.powi(4) * (1.0 + sz) - sz;
-            let r = ((1.0 - z) * (1.0 + z)).sqrt();
-            let measure = 4.0 * left.powi(3);
-            for (sin_phi, cos_phi) in &turns {
-                let (hx, hy, hz) = (alpha * (r * cos_phi + sx), alpha * r * sin_phi, z + sz);
-                let length2 = hx * hx + hy * hy + hz * hz;
-                let dot = sin * hx + mu * hz;
-                let wz = 2.0 * dot * hz / length2 - mu;
-                if wz <= 0.0 {
-                    continue;
-                }
-                let other = (wz * wz + alpha * alpha * (1.0 - wz * wz).max(0.0)).sqrt();
-                let weight = measure * wz * (mu + stretched) / (wz * stretched + mu * other);
-                even += weight;
-                let miss = 1.0 - dot / length2.sqrt();
-                grazing += weight * miss * miss * miss * miss * miss;
-            }
-        }
-        (even / (n * n) as f64, grazing / (n * n) as f64)
-    }
-
-    fn alpha_of(row: f64) -> f64 {
-        let first = f64::from(SPECULAR_BELOW).sqrt();
-        let root = first + (1.0 - first) * row / (ROWS - 1) as f64;
-        root * root
-    }
-
-    fn cosine_of(t: f64, alpha: f64) -> f64 {
-        let (x2, above) = if t < 0.5 {
-            (4.0 * t.powi(4), 1.0 - 4.0 * t.powi(4))
-        } else {
-            let below = 2.0 * (1.0 - t) * (1.0 - t);
-            ((1.0 - below) * (1.0 - below), below * (2.0 - below))
-        };
-        let scaled = alpha * alpha * x2;
-        (scaled / (above + scaled)).sqrt()
+    /// E and the albedo of (1 − v·h)⁵ at a cosine.
+    fn integrate(mu: f64, alpha: f64, n: usize) -> [f64; 2] {
+        visible_mean(mu, alpha, n, |dot, cos| {
+            let weight = passed(alpha, mu, 2.0 * dot * cos - mu);
+            [weight, weight * (1.0 - dot).powi(5)]
+        })
     }
 
     fn node(row: f64, column: f64, n: usize) -> [f64; 2] {
-        let alpha = alpha_of(row);
+        let alpha = alpha_of(row / (ROWS - 1) as f64);
         let mu = cosine_of(column / (COLUMNS - 1) as f64, alpha);
-        let (even, grazing) = integrate(mu, alpha, n);
+        let [even, grazing] = integrate(mu, alpha, n);
         [1.0 - even, grazing - even * (1.0 - mu).powi(5)]
     }
 
-    /// The means of the interpolated nodes: Simpson's rule in t within each cell, with dμ² by differences.
+    /// The means of the interpolated nodes.
     fn mean(nodes: &[[f32; 2]], row: f64) -> [f64; 2] {
-        let alpha = alpha_of(row);
+        let alpha = alpha_of(row / (ROWS - 1) as f64);
         let i = (row as usize).min(ROWS - 2);
         let f = row - i as f64;
         let at = |column: usize, k: usize| {
             let (a, b) = (nodes[i * COLUMNS + column][k], nodes[(i + 1) * COLUMNS + column][k]);
             f64::from(a) + f64::from(b - a) * f
         };
-        let (steps, mut sum, mut grazing) = (64, 0.0, 0.0);
-        for column in 0..COLUMNS - 1 {
-            for step in 0..steps {
-                let t = |s: f64| (column as f64 + s / f64::from(steps)) / (COLUMNS - 1) as f64;
-                let (low, high) =
-                    (cosine_of(t(f64::from(step)), alpha), cosine_of(t(f64::from(step) + 1.0), alpha));
-                let weight = high * high - low * low;
-                let g = (f64::from(step) + 0.5) / f64::from(steps);
-                let missing = at(column, 0) + (at(column + 1, 0) - at(column, 0)) * g;
-                let correction = at(column, 1) + (at(column + 1, 1) - at(column, 1)) * g;
-                let mu = cosine_of(t(f64::from(step) + 0.5), alpha);
-                sum += weight * missing;
-                grazing +=
-                    weight * ((1.0 - missing) * (1.0 - mu).powi(5) + correction).clamp(0.0, 1.0 - missing);
-            }
-        }
+        let [missing, grazing] = hemisphere(COLUMNS, alpha, |column, t, mu| {
+            let missing = at(column, 0) + (at(column + 1, 0) - at(column, 0)) * t;
+            let correction = at(column, 1) + (at(column + 1, 1) - at(column, 1)) * t;
+            [missing, ((1.0 - missing) * (1.0 - mu).powi(5) + correction).clamp(0.0, 1.0 - missing)]
+        });
         let c = alpha * alpha;
-        [sum / (c * libm::log(1.0 + 1.0 / c)), grazing]
+        [missing / (c * libm::log(1.0 + 1.0 / c)), grazing]
     }
 
     #[test]
@@ -252,9 +209,9 @@ mod tests {
         for row in (0..ROWS - 1).step_by(5) {
             for column in (0..COLUMNS - 1).step_by(4) {
                 let (row, column) = (row as f64 + 0.5, column as f64 + 0.5);
-                let alpha = alpha_of(row);
+                let alpha = alpha_of(row / (ROWS - 1) as f64);
                 let mu = cosine_of(column / (COLUMNS - 1) as f64, alpha);
-                let (even, grazing) = integrate(mu, alpha, 192);
+                let [even, grazing] = integrate(mu, alpha, 192);
                 let ggx = Ggx::new(alpha as f32).unwrap();
                 let w = Vec3::new((1.0 - mu * mu).sqrt() as f32, 0.0, mu as f32);
                 let got = Row::of(ggx.alpha).missing_and_grazing(w, ggx.alpha2, ggx.stretched(w));
@@ -268,9 +225,10 @@ mod tests {
     fn means_are_those_of_the_interpolated_table() {
         for i in 0..60 {
             let row = f64::from(i) * 0.79 + 0.03;
-            let alpha2 = (alpha_of(row) * alpha_of(row)) as f32;
+            let alpha = alpha_of(row / (ROWS - 1) as f64) as f32;
+            let alpha2 = alpha * alpha;
             let ell = libm::log1pf(1.0 / alpha2);
-            let got = Row::of(alpha_of(row) as f32).means(alpha2, ell);
+            let got = Row::of(alpha).means(alpha2, ell);
             let [scaled, grazing] = mean(&NODES, row);
             assert!(
                 (f64::from(got.missing) / (scaled * f64::from(alpha2 * ell)) - 1.0).abs() < 1e-3,

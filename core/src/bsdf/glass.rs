@@ -68,7 +68,9 @@ impl Glass {
         let kind = match (Ggx::new(alpha), s.walls) {
             _ if change < SAME_MEDIUM => Kind::Absent,
             (Some(ggx), Walls::Thin) => Kind::Sheet(Sheet::new(ggx, &interface)),
-            (Some(ggx), Walls::Solid) if alpha * change >= NARROWEST => Kind::Solid(Solid::new(ggx)),
+            (Some(ggx), Walls::Solid) if alpha * change >= NARROWEST => {
+                Kind::Solid(Solid::new(ggx, &interface))
+            }
             _ => Kind::Smooth(s.walls),
         };
         Self { interface, kind }
@@ -132,6 +134,11 @@ impl Interface {
         let wanted = (f0 * s.specular_color).min(Rgb::ONE);
         let slope = s.specular * (Rgb::ONE - wanted) / (1.0 - f0);
         Self { ior, walls: s.walls, tint: s.base_color, offset: s.specular * wanted - slope * f0, slope }
+    }
+
+    /// Whether the reflectance is Fresnel's own.
+    pub(super) fn is_plain(&self) -> bool {
+        (self.slope - Rgb::ONE).abs().max_element() < 1e-5 && self.offset.abs().max_element() < 1e-5
     }
 
     /// Index of the far side over that of the side of `wo`; a sheet is met from outside.

@@ -17,6 +17,8 @@ pub mod mixture;
 pub mod plastic;
 mod sheet;
 mod solid;
+mod solid_albedo;
+mod solid_between;
 pub mod surface;
 
 #[cfg(test)]

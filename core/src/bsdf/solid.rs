@@ -4,7 +4,8 @@ use crate::bsdf::event::{Scattered, Transport};
 use crate::bsdf::fresnel::dielectric_between;
 use crate::bsdf::ggx::{Ggx, Reach, reflect};
 use crate::bsdf::glass::{Interface, radiance_factor, refract};
-use crate::bsdf::lobe::{Drawn, Evaluated};
+use crate::bsdf::lobe::{Drawn, Evaluated, split};
+use crate::bsdf::solid_between::SolidBetween;
 use crate::math::colour::Rgb;
 use glam::{Vec2, Vec3};
 
@@ -12,85 +13,114 @@ use glam::{Vec2, Vec3};
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Solid {
     ggx: Ggx,
+    between: Option<SolidBetween>,
+}
+
+/// Two directions, mirrored so that `wo` is above.
+struct Pair {
+    wo: Vec3,
+    wi: Vec3,
+    /// Their stretched lengths.
+    stretched: [f32; 2],
+    /// Index of the far side over that of the side of `wo`.
+    eta: f32,
 }
 
 impl Solid {
-    pub(super) fn new(ggx: Ggx) -> Self {
-        Self { ggx }
+    pub(super) fn new(ggx: Ggx, interface: &Interface) -> Self {
+        Self { ggx, between: SolidBetween::new(ggx, interface) }
     }
 
     pub(super) fn evaluate(
-        self,
+        &self,
         interface: &Interface,
         wo: Vec3,
         wi: Vec3,
         transport: Transport,
     ) -> Evaluated {
+        let stretched = [self.ggx.stretched(wo), self.ggx.stretched(wi)];
         let eta = interface.eta(wo);
-        // Mirrored so that `wo` is above.
-        let side = wo.z.signum();
-        let (wo, wi) = (wo.with_z(wo.z.abs()), wi.with_z(wi.z * side));
-        if wi.z > 0.0 {
-            self.reflected(interface, wo, wi, eta)
-        } else {
-            self.refracted(interface, wo, wi, eta, transport)
+        let pair = Pair { wo: wo.with_z(wo.z.abs()), wi: wi.with_z(wi.z * wo.z.signum()), stretched, eta };
+        let (mut glossy, mut pdf) =
+            if pair.wi.z > 0.0 { self.reflected(interface, &pair) } else { self.refracted(interface, &pair) };
+        if let Some(between) = &self.between {
+            let sides = [between.side(wo.z), between.side(wi.z)];
+            let missing_o = between.missing(sides[0], pair.wo, stretched[0]);
+            let missing_i = between.missing(sides[1], wi.with_z(wi.z.abs()), stretched[1]);
+            let (rest, pdf_rest) = between.evaluate(sides, [missing_o, missing_i], wi.z.abs());
+            glossy += rest;
+            pdf += (pdf_rest - pdf) * missing_o;
         }
+        if pair.wi.z < 0.0 {
+            glossy *= radiance_factor(transport, eta);
+        }
+        Evaluated { value: Scattered { diffuse: Rgb::ZERO, glossy }, pdf }
     }
 
-    fn reflected(self, interface: &Interface, wo: Vec3, wi: Vec3, eta: f32) -> Evaluated {
+    /// Flux f · cos θᵢ and density of a single scattering.
+    fn reflected(&self, interface: &Interface, pair: &Pair) -> (Rgb, f32) {
+        let &Pair { wo, wi, stretched: [stretched_o, stretched_i], eta } = pair;
         let half = wo + wi;
         let length2 = half.length_squared();
         if length2 < f32::MIN_POSITIVE {
-            return Evaluated::default();
+            return (Rgb::ZERO, 0.0);
         }
         let facet = interface.facet(0.5 * length2.sqrt(), eta);
-        let Some(chance) = facet.chance_of_reflection() else { return Evaluated::default() };
-        let (stretched_o, stretched_i) = (self.ggx.stretched(wo), self.ggx.stretched(wi));
+        let Some(chance) = facet.chance_of_reflection() else { return (Rgb::ZERO, 0.0) };
         let density = self.ggx.density(half, length2);
         let shape = density * wi.z * Ggx::visibility(wo.z, stretched_o, wi.z, stretched_i);
-        let value = Scattered { diffuse: Rgb::ZERO, glossy: facet.reflected * shape };
-        Evaluated { value, pdf: 0.25 * chance * density * Ggx::visible(wo.z, stretched_o) }
+        (facet.reflected * shape, 0.25 * chance * density * Ggx::visible(wo.z, stretched_o))
     }
 
-    fn refracted(
-        self,
-        interface: &Interface,
-        wo: Vec3,
-        wi: Vec3,
-        eta: f32,
-        transport: Transport,
-    ) -> Evaluated {
+    /// Flux f · |cos θᵢ| and density of a single refraction.
+    fn refracted(&self, interface: &Interface, pair: &Pair) -> (Rgb, f32) {
+        let &Pair { wo, wi, stretched: [stretched_o, stretched_i], eta } = pair;
         // The half vector of refraction; its length is |wo·h + η wi·h|.
         let half = wo + wi * eta;
         let length2 = half.length_squared();
         if length2 < f32::MIN_POSITIVE {
-            return Evaluated::default();
+            return (Rgb::ZERO, 0.0);
         }
         let normal = half * (half.z.signum() / length2.sqrt());
         let (dot_o, dot_i) = (wo.dot(normal), -wi.dot(normal));
         if dot_o <= 0.0 || dot_i <= 0.0 {
-            return Evaluated::default();
+            return (Rgb::ZERO, 0.0);
         }
         let facet = interface.facet_of(dielectric_between(dot_o, dot_i, eta));
-        let Some(chance) = facet.chance_of_reflection() else { return Evaluated::default() };
-        let (stretched_o, stretched_i) = (self.ggx.stretched(wo), self.ggx.stretched(wi));
+        let Some(chance) = facet.chance_of_reflection() else { return (Rgb::ZERO, 0.0) };
         // D times the change of measure from normals to directions.
         let density = self.ggx.density(half, length2) * dot_o * dot_i * (eta * eta / length2);
         let shape = 4.0 * density * -wi.z * Ggx::visibility(wo.z, stretched_o, -wi.z, stretched_i);
-        let glossy = facet.transmitted * (shape * radiance_factor(transport, eta));
-        let pdf = (1.0 - chance) * density * Ggx::visible(wo.z, stretched_o);
-        Evaluated { value: Scattered { diffuse: Rgb::ZERO, glossy }, pdf }
+        (facet.transmitted * shape, (1.0 - chance) * density * Ggx::visible(wo.z, stretched_o))
     }
 
-    pub(super) fn draw(self, interface: &Interface, wo: Vec3, u_lobe: f32, u: Vec2) -> Option<Drawn> {
+    pub(super) fn draw(&self, interface: &Interface, wo: Vec3, u_lobe: f32, u: Vec2) -> Option<Drawn> {
         let eta = interface.eta(wo);
-        let side = wo.z.signum();
         let above = wo.with_z(wo.z.abs());
-        let half = self.ggx.sample_visible(above, u, Reach::Full);
-        let chance = interface.facet(above.dot(half).max(0.0), eta).chance_of_reflection()?;
-        let (wi, eta) =
-            if u_lobe < chance { (reflect(above, half), 1.0) } else { (refract(above, half, eta)?, eta) };
-        let right_side = if u_lobe < chance { wi.z > 0.0 } else { wi.z < 0.0 };
-        right_side.then(|| Drawn { wi: wi.with_z(wi.z * side), eta, delta: None })
+        let wi = match &self.between {
+            None => self.draw_single(interface, above, eta, u_lobe, u)?,
+            Some(between) => {
+                let side = between.side(wo.z);
+                let missing = between.missing(side, above, self.ggx.stretched(above));
+                match split(u_lobe, missing) {
+                    Ok(rest) => between.draw(side, rest, u)?,
+                    Err(rest) => self.draw_single(interface, above, eta, rest, u)?,
+                }
+            }
+        };
+        let eta = if wi.z > 0.0 { 1.0 } else { eta };
+        Some(Drawn { wi: wi.with_z(wi.z * wo.z.signum()), eta, delta: None })
+    }
+
+    /// For `wo` above.
+    fn draw_single(&self, interface: &Interface, wo: Vec3, eta: f32, u_side: f32, u: Vec2) -> Option<Vec3> {
+        let half = self.ggx.sample_visible(wo, u, Reach::Full);
+        let chance = interface.facet(wo.dot(half).max(0.0), eta).chance_of_reflection()?;
+        if u_side < chance {
+            let wi = reflect(wo, half);
+            (wi.z > 0.0).then_some(wi)
+        } else {
+            refract(wo, half, eta).filter(|wi| wi.z < 0.0)
+        }
     }
 }

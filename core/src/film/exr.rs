@@ -199,15 +199,17 @@ pub fn write_picture(picture: &Picture, attributes: &PictureAttributes) -> Vec<u
         ("ovtigre.method", &attributes.method),
         ("ovtigre.paths", &attributes.paths),
         ("ovtigre.manifest", &attributes.manifest),
-        ("software", &attributes.software),
     ];
     let mut values: Vec<(&str, AttributeValue)> =
         texts.map(|(name, value)| (name, AttributeValue::Text(text(value)))).to_vec();
     values.push(("ovtigre.samples", AttributeValue::F32(attributes.samples as f32)));
     values.push(("samplesPerPixel", AttributeValue::I32(attributes.samples.round() as i32)));
     values.push(("renderTimeSeconds", AttributeValue::F32(attributes.render_seconds as f32)));
-    let layer =
-        LayerAttributes { capture_date: Some(text(&attributes.capture_date)), ..LayerAttributes::default() };
+    let layer = LayerAttributes {
+        capture_date: Some(text(&attributes.capture_date)),
+        software_name: Some(text(&attributes.software)),
+        ..LayerAttributes::default()
+    };
     encode(&planes, picture.size, picture.region, values, Encoding::SMALL_LOSSLESS, layer)
 }
 
@@ -325,6 +327,31 @@ mod tests {
         let bytes = write_partial(&sum(), Size { width: 8, height: 4 }, &attributes());
         let (read, says) = read_partial(&bytes, 6).unwrap();
         assert_eq!((read, says), (sum(), attributes()));
+    }
+
+    #[test]
+    fn a_picture_has_its_channels_and_says_what_it_is() {
+        let region = Region { x: 2, y: 1, width: 3, height: 2 };
+        let plane = |v: f32| -> Plane { (0..6).map(|i| [v + i as f32, 0.5, 1e-30]).collect() };
+        let (size, samples) = (Size { width: 8, height: 4 }, 12.0);
+        let picture = Picture { size, region, planes: vec![plane(1.0)], error: Some(plane(0.1)), samples };
+        let says = PictureAttributes {
+            job: "j".to_owned(),
+            scene: "s".to_owned(),
+            samples,
+            seed: 1,
+            method: "path".to_owned(),
+            paths: "L(D|S)*E".to_owned(),
+            manifest: "m".to_owned(),
+            render_seconds: 1.5,
+            software: "ovtigre".to_owned(),
+            capture_date: "2026:01:02 03:04:05".to_owned(),
+        };
+        let layers = read_layers(&write_picture(&picture, &says)).unwrap();
+        let names: Vec<&str> = layers.channels.keys().map(String::as_str).collect();
+        assert_eq!(names, ["B", "G", "R", "error.B", "error.G", "error.R"]);
+        assert_eq!(layers.channels["R"], [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+        assert_eq!(layers.attributes["ovtigre.paths"], "L(D|S)*E");
     }
 
     #[test]

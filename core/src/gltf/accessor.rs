@@ -189,7 +189,8 @@ impl<'a> Source<'a> {
             Some(last) => last.checked_mul(stride as u64).and_then(|n| n.checked_add(size as u64)),
             None => Some(0),
         };
-        let end = needed.and_then(|n| n.checked_add(offset)).filter(|end| *end <= view_bytes.bytes.len() as u64);
+        let end =
+            needed.and_then(|n| n.checked_add(offset)).filter(|end| *end <= view_bytes.bytes.len() as u64);
         let Some(end) = end else {
             let have = view_bytes.bytes.len();
             return Err(self.document.error(

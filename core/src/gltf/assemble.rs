@@ -14,6 +14,9 @@ use crate::scene::normalisation::Normalisation;
 use glam::{DAffine3, DVec3, Vec3, Vec4};
 use std::collections::BTreeMap;
 
+/// The scene's materials by their index in the document; `None` is the default one.
+pub(crate) type MaterialIds = BTreeMap<Option<usize>, MaterialId>;
+
 /// Meshes and instances of a scene.
 pub(crate) struct Assembled {
     pub(crate) meshes: Vec<Mesh>,
@@ -36,7 +39,7 @@ pub(crate) fn assemble(
     document: &Document,
     tree: &Tree<'_>,
     mut shapes: Vec<Shape>,
-    ids: &BTreeMap<Option<usize>, MaterialId>,
+    ids: &MaterialIds,
     dropped: &mut Dropped,
     problems: &mut Problems,
 ) -> Result<Assembled, LoadError> {
@@ -64,7 +67,8 @@ pub(crate) fn assemble(
             gather(&mut gathered, &route, name, ids, dropped);
             if gathered.triangles.len() == before {
                 dropped.instances += 1;
-                problems.add(&node.at.pointer, "its transform leaves nothing of its mesh that light could meet");
+                problems
+                    .add(&node.at.pointer, "its transform leaves nothing of its mesh that light could meet");
             }
         }
         if moved.is_empty() {
@@ -73,6 +77,12 @@ pub(crate) fn assemble(
         let mut mesh = Mesh::default();
         let route = Route { shape: &shape, world: DAffine3::IDENTITY, normalisation: local };
         gather(&mut mesh, &route, &shape.name, ids, dropped);
+        if mesh.triangles.is_empty() {
+            dropped.instances += moved.len() as u64;
+            let pointer = format!("/meshes/{}", shape.mesh);
+            problems.add(pointer, "all its triangles vanish in single precision: it is left out");
+            continue;
+        }
         let id = MeshId(meshes.len() as u32);
         meshes.push(mesh);
         instances.extend(moved.into_iter().map(|(place, placement)| Instance {
@@ -90,7 +100,9 @@ pub(crate) fn assemble(
 fn place_gathered(gathered: Mesh, meshes: &mut Vec<Mesh>, instances: &mut Vec<Instance>) {
     if gathered.triangles.is_empty() {
         meshes.remove(0);
-        instances.iter_mut().for_each(|instance| instance.mesh.0 -= 1);
+        for instance in instances.iter_mut() {
+            instance.mesh.0 -= 1;
+        }
     } else {
         meshes[0] = gathered;
         instances.insert(0, Instance { mesh: MeshId(0), name: String::new(), placement: Placement::World });
@@ -138,20 +150,15 @@ fn scene_bounds(meshes: &[Mesh], instances: &[Instance]) -> Bounds {
     for instance in instances {
         let to_world = instance.placement.to_world();
         let matrix = glam::Mat3::from(to_world.matrix3).as_dmat3();
-        let transform = DAffine3 { matrix3: matrix, translation: Vec3::from(to_world.translation).as_dvec3() };
+        let transform =
+            DAffine3 { matrix3: matrix, translation: Vec3::from(to_world.translation).as_dvec3() };
         all = all.union(of[instance.mesh.index()].transformed(&transform));
     }
     all
 }
 
 /// Appends a shape to a mesh.
-fn gather(
-    mesh: &mut Mesh,
-    route: &Route<'_>,
-    name: &str,
-    ids: &BTreeMap<Option<usize>, MaterialId>,
-    dropped: &mut Dropped,
-) {
+fn gather(mesh: &mut Mesh, route: &Route<'_>, name: &str, ids: &MaterialIds, dropped: &mut Dropped) {
     let first = mesh.triangles.len() as u32;
     for geometry in &route.shape.geometries {
         let base = mesh.positions.len() as u32;
@@ -179,13 +186,15 @@ fn append_vertices(mesh: &mut Mesh, route: &Route<'_>, geometry: &Geometry, hand
     let after = before + geometry.positions.len();
     let rigid = geometry.influences.is_none();
     let normals = normal_matrix(&route.world.matrix3);
-    let transform = |v: usize| if rigid { route.world } else { route.shape.transform(geometry, v, &route.world) };
+    let transform =
+        |v: usize| if rigid { route.world } else { route.shape.transform(geometry, v, &route.world) };
     if let Some(influences) = &geometry.influences {
         *handedness = Handedness::of(&influences.transform(0, &route.shape.joints).matrix3);
     }
-    mesh.positions.extend((geometry.positions.iter().enumerate()).map(|(v, p)| {
-        route.normalisation.point(transform(v).transform_point3(p.as_dvec3()))
-    }));
+    mesh.positions.extend(
+        (geometry.positions.iter().enumerate())
+            .map(|(v, p)| route.normalisation.point(transform(v).transform_point3(p.as_dvec3()))),
+    );
     let normal = |(v, n): (usize, &Vec3)| {
         let matrix = if rigid { normals } else { normal_matrix(&transform(v).matrix3) };
         (matrix * n.as_dvec3()).normalize_or_zero().as_vec3()

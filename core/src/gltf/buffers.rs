@@ -24,7 +24,11 @@ pub(crate) struct View<'a> {
 }
 
 /// The bytes that the URI of `item` names.
-pub(crate) fn read_uri<'a>(bundle: &'a Bundle, item: &At<'_>, text: &str) -> Result<Cow<'a, [u8]>, LoadError> {
+pub(crate) fn read_uri<'a>(
+    bundle: &'a Bundle,
+    item: &At<'_>,
+    text: &str,
+) -> Result<Cow<'a, [u8]>, LoadError> {
     let pointer = item.pointer_to("uri");
     let refused = |detail| LoadError::Uri {
         file: bundle.name().to_owned(),
@@ -75,7 +79,13 @@ impl<'a> Buffers<'a> {
             if total > limits.buffer_bytes {
                 let (file, pointer) = (document.file().to_owned(), item.pointer.clone());
                 let what = "bytes of buffers";
-                return Err(LoadError::Limit { file, pointer, what, found: total, limit: limits.buffer_bytes });
+                return Err(LoadError::Limit {
+                    file,
+                    pointer,
+                    what,
+                    found: total,
+                    limit: limits.buffer_bytes,
+                });
             }
         }
         Ok(buffers)
@@ -96,7 +106,8 @@ impl<'a> Buffers<'a> {
             return Err(item.error("\"byteStride\" must be 4 to 252"));
         }
         let Some(whole) = self.whole(buffer) else {
-            return Err(item.error(format!("refers to /buffers/{buffer}, which has no data: no URI, no binary chunk")));
+            return Err(item
+                .error(format!("refers to /buffers/{buffer}, which has no data: no URI, no binary chunk")));
         };
         let end = offset.checked_add(length).filter(|end| *end <= whole.len() as u64);
         let Some(end) = end else {

@@ -5,7 +5,7 @@ use crate::gltf::error::LoadError;
 use crate::gltf::limits::Limits;
 use crate::gltf::{glb, uri};
 use std::borrow::Cow;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::{Cursor, Read, Write};
 use std::ops::Range;
 use std::sync::Arc;
@@ -90,7 +90,8 @@ impl Bundle {
     /// An archive of a scene and the files it refers to: stored, in order of name, without times, so that
     /// the same files give the same bytes. Names are relative to the folder of the document.
     pub fn pack(main: (&str, &[u8]), files: &[(String, Vec<u8>)]) -> Vec<u8> {
-        let mut sorted: BTreeMap<&str, &[u8]> = files.iter().map(|(n, b)| (n.as_str(), b.as_slice())).collect();
+        let mut sorted: BTreeMap<&str, &[u8]> =
+            files.iter().map(|(n, b)| (n.as_str(), b.as_slice())).collect();
         sorted.insert(main.0, main.1);
         let mut writer = ZipWriter::new(Cursor::new(Vec::new()));
         for (name, bytes) in sorted {
@@ -107,8 +108,8 @@ impl Bundle {
 
     fn open_archive(bytes: Arc<[u8]>) -> Result<Self, LoadError> {
         let refuse = |detail: String| LoadError::Container { file: "archive".to_owned(), detail };
-        let mut archive =
-            ZipArchive::new(Cursor::new(bytes.clone())).map_err(|e| refuse(format!("the .zip is broken: {e}")))?;
+        let mut archive = ZipArchive::new(Cursor::new(bytes.clone()))
+            .map_err(|e| refuse(format!("the .zip is broken: {e}")))?;
         if archive.len() > ENTRIES {
             let found = archive.len();
             return Err(refuse(format!("the .zip holds {found} files, more than the limit of {ENTRIES}")));
@@ -207,7 +208,8 @@ fn read_directory(
         if file.encrypted() {
             return Err(format!("\"{shown}\" in the .zip is encrypted; pack it without a password"));
         }
-        let name = uri::normalise(&raw).map_err(|why| format!("\"{shown}\" in the .zip is refused: {why}"))?;
+        let name =
+            uri::normalise(&raw).map_err(|why| format!("\"{shown}\" in the .zip is refused: {why}"))?;
         let size = file.size();
         let stored = (file.compression() == CompressionMethod::Stored)
             .then(|| {
@@ -235,7 +237,9 @@ fn find_main(entries: &BTreeMap<String, Entry>) -> Result<String, String> {
             [] => {}
             [one] => return Ok((*one).clone()),
             [one, other, ..] => {
-                return Err(format!("the .zip holds several scenes (\"{one}\", \"{other}\"); pack one alone"));
+                return Err(format!(
+                    "the .zip holds several scenes (\"{one}\", \"{other}\"); pack one alone"
+                ));
             }
         }
     }
@@ -260,7 +264,7 @@ pub fn references(scene: &[u8]) -> Result<Vec<String>, LoadError> {
     let bundle = Bundle::open(scene)?;
     let parts = bundle.parts()?;
     let document = Document::parse(bundle.name(), &parts.json, &Limits::default())?;
-    let mut files = BTreeMap::new();
+    let mut files = BTreeSet::new();
     for list in ["buffers", "images"] {
         for item in document.list(list)? {
             let Some(text) = item.text("uri")?.filter(|text| !text.starts_with("data:")) else {
@@ -272,8 +276,8 @@ pub fn references(scene: &[u8]) -> Result<Vec<String>, LoadError> {
                 uri: uri::shorten(text),
                 detail,
             })?;
-            files.insert(file, ());
+            files.insert(file);
         }
     }
-    Ok(files.into_keys().collect())
+    Ok(files.into_iter().collect())
 }

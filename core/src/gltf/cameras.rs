@@ -40,7 +40,9 @@ fn projection(item: &At<'_>) -> Result<Projection, LoadError> {
             }
             let aspect = at.number("aspectRatio")?;
             if aspect.is_some_and(|a| !(a > 0.0 && (a as f32).is_finite())) {
-                return Err(at.error(format!("\"aspectRatio\" is {}, but must be positive", aspect.unwrap_or(0.0))));
+                return Err(
+                    at.error(format!("\"aspectRatio\" is {}, but must be positive", aspect.unwrap_or(0.0)))
+                );
             }
             Ok(Projection::Perspective {
                 tan_half_y: libm::tan(angle * 0.5) as f32,
@@ -56,7 +58,10 @@ fn projection(item: &At<'_>) -> Result<Projection, LoadError> {
             };
             Ok(Projection::Orthographic { half_width: half("xmag")?, half_height: half("ymag")? })
         }
-        Some(other) => Err(item.error(format!("the type \"{}\" is no camera of glTF 2.0", crate::gltf::uri::shorten(other)))),
+        Some(other) => {
+            Err(item
+                .error(format!("the type \"{}\" is no camera of glTF 2.0", crate::gltf::uri::shorten(other))))
+        }
         None => Err(item.error("\"type\" is missing")),
     }
 }

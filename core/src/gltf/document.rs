@@ -61,7 +61,7 @@ impl Document {
     pub(crate) fn item(&self, key: &str, index: usize) -> Result<At<'_>, LoadError> {
         let pointer = format!("/{key}/{index}");
         match self.root.get(key).and_then(|list| list.get(index)) {
-            Some(value) => At { file: &self.file, value, pointer }.as_object(),
+            Some(value) => At { file: &self.file, value, pointer }.into_object(),
             None => Err(self.error(pointer, format!("there are only {} {key}", self.count(key)))),
         }
     }
@@ -96,14 +96,18 @@ pub(crate) fn kind(value: &Value) -> &'static str {
 pub(crate) fn whole(value: &Value) -> Option<u64> {
     value.as_u64().or_else(|| {
         let number = value.as_f64()?;
-        (number >= 0.0 && number < 9.007_199_254_740_992e15 && number.fract() == 0.0).then_some(number as u64)
+        ((0.0..9.007_199_254_740_992e15).contains(&number) && number.fract() == 0.0).then_some(number as u64)
     })
 }
 
 impl<'a> At<'a> {
     /// An error here.
     pub(crate) fn error(&self, detail: impl Into<String>) -> LoadError {
-        LoadError::Document { file: self.file.to_owned(), pointer: self.pointer.clone(), detail: detail.into() }
+        LoadError::Document {
+            file: self.file.to_owned(),
+            pointer: self.pointer.clone(),
+            detail: detail.into(),
+        }
     }
 
     /// The error of a value that is not `wanted`.
@@ -111,7 +115,7 @@ impl<'a> At<'a> {
         self.error(format!("should be {wanted}, but is {}", kind(self.value)))
     }
 
-    fn as_object(self) -> Result<Self, LoadError> {
+    fn into_object(self) -> Result<Self, LoadError> {
         if self.value.is_object() { Ok(self) } else { Err(self.mismatch("an object")) }
     }
 
@@ -140,7 +144,7 @@ impl<'a> At<'a> {
 
     /// An object.
     pub(crate) fn object(&self, key: &str) -> Result<Option<Self>, LoadError> {
-        self.get(key).map(Self::as_object).transpose()
+        self.get(key).map(Self::into_object).transpose()
     }
 
     /// An extension's object.
@@ -165,7 +169,7 @@ impl<'a> At<'a> {
 
     /// The elements of an array of objects; none where it is absent.
     pub(crate) fn items(&self, key: &str) -> Result<Vec<Self>, LoadError> {
-        self.elements(key)?.into_iter().map(Self::as_object).collect()
+        self.elements(key)?.into_iter().map(Self::into_object).collect()
     }
 
     /// This value as an index into a list of `count` `things`.
@@ -221,7 +225,9 @@ impl<'a> At<'a> {
         }
         let mut numbers = [0.0; N];
         for (number, value) in numbers.iter_mut().zip(list) {
-            *number = value.as_f64().ok_or_else(|| at.error(format!("holds {} instead of a number", kind(value))))?;
+            *number = value
+                .as_f64()
+                .ok_or_else(|| at.error(format!("holds {} instead of a number", kind(value))))?;
         }
         Ok(Some(numbers))
     }

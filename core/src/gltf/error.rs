@@ -34,7 +34,9 @@ pub enum LoadError {
         detail: String,
     },
     /// The document needs an extension that is not supported.
-    #[error("{file}: {pointer}: the scene requires the extension {name}, which is not supported; export it without")]
+    #[error(
+        "{file}: {pointer}: the scene requires the extension {name}, which is not supported; export it without"
+    )]
     RequiredExtension {
         /// Name of the file.
         file: String,

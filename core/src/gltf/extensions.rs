@@ -16,6 +16,7 @@ fn support(name: &str) -> Option<Support> {
         "KHR_lights_punctual"
         | "KHR_materials_emissive_strength"
         | "KHR_materials_ior"
+        | "KHR_materials_pbrSpecularGlossiness"
         | "KHR_materials_specular"
         | "KHR_materials_transmission"
         | "KHR_materials_volume"
@@ -49,7 +50,9 @@ pub(crate) fn check(document: &Document, problems: &mut Problems) -> Result<(), 
         match support(name) {
             Some(Support::Full) => {}
             Some(Support::Partly(left_out)) => problems.add(&at.pointer, format!("{name}: {left_out}")),
-            None => problems.add(&at.pointer, format!("the extension {name} is not supported and is left out")),
+            None => {
+                problems.add(&at.pointer, format!("the extension {name} is not supported and is left out"));
+            }
         }
     }
     Ok(())

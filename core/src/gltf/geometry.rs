@@ -62,11 +62,11 @@ pub(crate) fn read<'a>(
     check_shape(&attributes, "POSITION", &position, &[3])?;
     let targets = morph_targets(at, weights)?;
     let mut triangles = corners(at, source, position.count, problems)?;
-    let mut primitive = Primitive { at, attributes, source, vertices: position.count, used: Vec::new(), targets };
+    let mut primitive =
+        Primitive { at, attributes, source, vertices: position.count, used: Vec::new(), targets };
     primitive.used = renumber(&mut triangles, position.count);
     let mut geometry = Geometry { triangles, ..Geometry::default() };
-    geometry.material =
-        at.index("material", "materials", source.document.count("materials"))?;
+    geometry.material = at.index("material", "materials", source.document.count("materials"))?;
     geometry.positions = primitive.positions(&position)?;
     geometry.normals = primitive.normals(problems)?;
     geometry.colours = primitive.colours()?;
@@ -93,7 +93,8 @@ pub(crate) fn read<'a>(
 /// Number of triangles that a primitive promises, and whether it has a surface at all.
 pub(crate) fn promised(at: &At<'_>, source: Source<'_>) -> Result<(Mode, u64), LoadError> {
     let code = at.whole("mode")?.unwrap_or(4);
-    let mode = Mode::from_code(code).ok_or_else(|| at.error(format!("the mode {code} does not exist in glTF 2.0")))?;
+    let mode = Mode::from_code(code)
+        .ok_or_else(|| at.error(format!("the mode {code} does not exist in glTF 2.0")))?;
     let accessors = source.document.count("accessors");
     let index = match at.index("indices", "accessors", accessors)? {
         Some(index) => Some(index),
@@ -103,20 +104,29 @@ pub(crate) fn promised(at: &At<'_>, source: Source<'_>) -> Result<(Mode, u64), L
         },
     };
     let count = match index {
-        Some(index) => source.document.item("accessors", index)?.whole("count")?.unwrap_or(0),
+        Some(index) => source.accessor(index)?.count,
         None => 0,
     };
-    Ok((mode, mode.count(usize::try_from(count).unwrap_or(usize::MAX)) as u64))
+    Ok((mode, mode.count(count) as u64))
 }
 
-fn accessor<'a>(source: Source<'a>, attributes: &At<'_>, name: &str) -> Result<Option<Accessor<'a>>, LoadError> {
+fn accessor<'a>(
+    source: Source<'a>,
+    attributes: &At<'_>,
+    name: &str,
+) -> Result<Option<Accessor<'a>>, LoadError> {
     match attributes.index(name, "accessors", source.document.count("accessors"))? {
         Some(index) => source.accessor(index).map(Some),
         None => Ok(None),
     }
 }
 
-fn check_shape(attributes: &At<'_>, name: &str, accessor: &Accessor<'_>, allowed: &[usize]) -> Result<(), LoadError> {
+fn check_shape(
+    attributes: &At<'_>,
+    name: &str,
+    accessor: &Accessor<'_>,
+    allowed: &[usize],
+) -> Result<(), LoadError> {
     if allowed.contains(&accessor.components) {
         return Ok(());
     }
@@ -156,14 +166,19 @@ fn corners(
         _ => 0,
     };
     if leftover > 0 {
-        problems.add(&at.pointer, format!("{leftover} of its {count} corners make no whole triangle and are left out"));
+        problems.add(
+            &at.pointer,
+            format!("{leftover} of its {count} corners make no whole triangle and are left out"),
+        );
     }
     let corner = |i: usize| -> Result<u32, LoadError> {
         let vertex = indices.as_ref().map_or(i as u32, |indices| indices.get_index(i));
         if (vertex as usize) < vertices {
             return Ok(vertex);
         }
-        Err(at.need("indices")?.error(format!("element {i} is {vertex}, but POSITION has only {vertices} vertices")))
+        Err(at
+            .need("indices")?
+            .error(format!("element {i} is {vertex}, but POSITION has only {vertices} vertices")))
     };
     // Every index is checked, also those of corners that make no triangle.
     for i in mode.count(count) * 3..if mode == Mode::Triangles { count } else { 0 } {
@@ -199,6 +214,13 @@ fn renumber(triangles: &mut [[u32; 3]], vertices: usize) -> Vec<u32> {
     used
 }
 
+fn not_finite(attributes: &At<'_>, name: &str, vertex: u32) -> LoadError {
+    match attributes.need(name) {
+        Ok(at) => at.error(format!("vertex {vertex} is not a finite number")),
+        Err(error) => error,
+    }
+}
+
 impl<'a> Primitive<'a> {
     /// An attribute of the shape wanted, as many elements as positions.
     fn attribute(
@@ -213,18 +235,11 @@ impl<'a> Primitive<'a> {
         check_shape(attributes, name, &accessor, allowed)?;
         if accessor.count < self.vertices {
             let (have, vertices) = (accessor.count, self.vertices);
-            return Err(attributes
-                .need(name)?
-                .error(format!("has {have} elements, but POSITION has {vertices}: all attributes must have as many")));
+            return Err(attributes.need(name)?.error(format!(
+                "has {have} elements, but POSITION has {vertices}: all attributes must have as many"
+            )));
         }
         Ok(Some(accessor))
-    }
-
-    fn not_finite(&self, attributes: &At<'_>, name: &str, vertex: u32) -> LoadError {
-        match attributes.need(name) {
-            Ok(at) => at.error(format!("vertex {vertex} is not a finite number")),
-            Err(error) => error,
-        }
     }
 
     /// Finite vectors of the used vertices.
@@ -240,7 +255,7 @@ impl<'a> Primitive<'a> {
                 if numbers.iter().all(|x| x.is_finite()) {
                     Ok(numbers)
                 } else {
-                    Err(self.not_finite(attributes, name, v))
+                    Err(not_finite(attributes, name, v))
                 }
             })
             .collect()
@@ -251,7 +266,9 @@ impl<'a> Primitive<'a> {
         let mut positions: Vec<Vec3> = read.into_iter().map(Vec3::from).collect();
         self.morph("POSITION", &mut positions)?;
         if let Some(i) = positions.iter().position(|p| !p.is_finite()) {
-            return Err(self.at.error(format!("vertex {} is morphed beyond the range of numbers", self.used[i])));
+            return Err(self
+                .at
+                .error(format!("vertex {} is morphed beyond the range of numbers", self.used[i])));
         }
         Ok(positions)
     }
@@ -274,12 +291,14 @@ impl<'a> Primitive<'a> {
         let Some(accessor) = self.attribute(&self.attributes, "NORMAL", &[3])? else {
             return Ok(Vec::new());
         };
-        let mut normals: Vec<Vec3> = self.used.iter().map(|&v| Vec3::from(accessor.get::<3>(v as usize))).collect();
+        let mut normals: Vec<Vec3> =
+            self.used.iter().map(|&v| Vec3::from(accessor.get::<3>(v as usize))).collect();
         self.morph("NORMAL", &mut normals)?;
         let mut unusable = 0_usize;
         for normal in &mut normals {
             // Normals as short as 1e-30 still say where they point.
-            let unit = if normal.is_finite() { normal.as_dvec3().normalize_or_zero().as_vec3() } else { Vec3::ZERO };
+            let unit =
+                if normal.is_finite() { normal.as_dvec3().normalize_or_zero().as_vec3() } else { Vec3::ZERO };
             unusable += usize::from(unit == Vec3::ZERO);
             *normal = unit;
         }
@@ -324,7 +343,9 @@ impl<'a> Primitive<'a> {
             .map(|c| Vec4::from(c).max(Vec4::ZERO))
             .collect();
         if accessor.components == 3 {
-            colours.iter_mut().for_each(|c| c.w = 1.0);
+            for colour in &mut colours {
+                colour.w = 1.0;
+            }
         }
         if colours.iter().all(|c| *c == Vec4::ONE) {
             colours.clear();
@@ -350,6 +371,18 @@ impl<'a> Primitive<'a> {
     }
 }
 
+fn keep<T: Copy>(list: &mut Vec<T>, used: &[u32]) {
+    if !list.is_empty() {
+        *list = used.iter().map(|&v| list[v as usize]).collect();
+    }
+}
+
+fn again<T: Copy>(list: &mut Vec<T>, vertex: usize) {
+    if let Some(&value) = list.get(vertex) {
+        list.push(value);
+    }
+}
+
 impl Geometry {
     /// Leaves out triangles without area. Differences of floats and their products are nearly exact in double
     /// precision, so what remains has a normal.
@@ -367,11 +400,6 @@ impl Geometry {
         if used.len() == vertices {
             return;
         }
-        fn keep<T: Copy>(list: &mut Vec<T>, used: &[u32]) {
-            if !list.is_empty() {
-                *list = used.iter().map(|&v| list[v as usize]).collect();
-            }
-        }
         keep(&mut self.positions, &used);
         keep(&mut self.normals, &used);
         keep(&mut self.tangents, &used);
@@ -385,11 +413,6 @@ impl Geometry {
 
     /// A copy of a vertex, by its number.
     pub(crate) fn duplicate(&mut self, vertex: usize) -> u32 {
-        fn again<T: Copy>(list: &mut Vec<T>, vertex: usize) {
-            if let Some(&value) = list.get(vertex) {
-                list.push(value);
-            }
-        }
         let new = self.positions.len() as u32;
         again(&mut self.positions, vertex);
         again(&mut self.normals, vertex);

@@ -65,7 +65,9 @@ fn chunk(bytes: &[u8], at: usize, length: usize) -> Result<(Range<usize>, u32), 
     }
     if size > length - start {
         let left = length - start;
-        return Err(format!("the chunk at byte {at} of the .glb says {size} bytes, but only {left} are left"));
+        return Err(format!(
+            "the chunk at byte {at} of the .glb says {size} bytes, but only {left} are left"
+        ));
     }
     Ok((start..start + size, kind))
 }

@@ -53,7 +53,11 @@ fn kind(
     let scale = normalisation.scale();
     let finite = |value: DVec3| -> Result<Rgb, LoadError> {
         let rounded = value.as_vec3();
-        if rounded.is_finite() { Ok(rounded) } else { Err(item.error("\"intensity\" exceeds the range of numbers")) }
+        if rounded.is_finite() {
+            Ok(rounded)
+        } else {
+            Err(item.error("\"intensity\" exceeds the range of numbers"))
+        }
     };
     let position = normalisation.point(node.world.translation);
     if !position.is_finite() {

@@ -1,7 +1,7 @@
 //! A bundle to a scene.
 
 use crate::gltf::accessor::Source;
-use crate::gltf::assemble::{Assembled, assemble};
+use crate::gltf::assemble::{Assembled, MaterialIds, assemble};
 use crate::gltf::buffers::Buffers;
 use crate::gltf::bundle::Bundle;
 use crate::gltf::document::Document;
@@ -46,7 +46,7 @@ pub fn load(bundle: &Bundle, limits: &Limits) -> Result<Loaded, LoadError> {
     let mut shapes = shapes::find(source, &tree)?;
     let read = shapes::read(source, &mut shapes, &mut table, &mut dropped, &mut problems)?;
     let (meshes, instances) = count_uses(&shapes);
-    let pictures = pictures::read(bundle, source, &table.images())?;
+    let pictures = pictures::read(bundle, source, &table.images(), &mut problems)?;
     survey::survey(bundle, source, &table.images(), &mut problems);
     let textures = table.finish(&pictures);
     let (materials, ids) = number_materials(&document, read, &shapes, &textures)?;
@@ -73,17 +73,20 @@ pub fn load(bundle: &Bundle, limits: &Limits) -> Result<Loaded, LoadError> {
 
 fn check_version(document: &Document) -> Result<(), LoadError> {
     let root = document.root();
-    let asset = root.object("asset")?.ok_or_else(|| root.error("\"asset\" is missing: this is no glTF 2.0"))?;
+    let asset =
+        root.object("asset")?.ok_or_else(|| root.error("\"asset\" is missing: this is no glTF 2.0"))?;
     for key in ["minVersion", "version"] {
         let Some(text) = asset.text(key)? else {
             continue;
         };
         let mut numbers = text.split('.').map(str::parse::<u32>);
         match (key, numbers.next(), numbers.next(), numbers.next()) {
-            ("version", Some(Ok(2)), Some(Ok(_)), None) | ("minVersion", Some(Ok(2)), Some(Ok(0)), None) => {}
-            ("minVersion", Some(Ok(0 | 1)), Some(Ok(_)), None) => {}
+            ("version", Some(Ok(2)), Some(Ok(_)), None)
+            | ("minVersion", Some(Ok(2)), Some(Ok(0)), None)
+            | ("minVersion", Some(Ok(0 | 1)), Some(Ok(_)), None) => {}
             (_, Some(Ok(major)), Some(Ok(minor)), None) => {
-                return Err(asset.error(format!("glTF {major}.{minor} is not supported; convert the scene to glTF 2.0")));
+                return Err(asset
+                    .error(format!("glTF {major}.{minor} is not supported; convert the scene to glTF 2.0")));
             }
             _ => return Err(asset.error(format!("\"{key}\" is not a version such as 2.0"))),
         }
@@ -109,7 +112,7 @@ fn number_materials(
     read: Materials,
     shapes: &[Shape],
     textures: &[Texture],
-) -> Result<(Vec<Material>, BTreeMap<Option<usize>, MaterialId>), LoadError> {
+) -> Result<(Vec<Material>, MaterialIds), LoadError> {
     let mut least_alpha: BTreeMap<Option<usize>, f32> = BTreeMap::new();
     for geometry in shapes.iter().flat_map(|shape| &shape.geometries).filter(|g| !g.triangles.is_empty()) {
         let least = least_alpha.entry(geometry.material).or_insert(1.0);
@@ -146,7 +149,8 @@ fn point_out_what_is_missing(scene: &SceneData, report: &Report, problems: &mut 
         problems.add("", "there is no camera: the scene is framed");
     }
     if report.emissive_triangles == 0 && scene.punctual.is_empty() {
-        problems.add("", "there is no light: the scene is lit by a default sky unless an environment is given");
+        problems
+            .add("", "there is no light: the scene is lit by a default sky unless an environment is given");
     }
     let degenerate = report.dropped.degenerate_triangles;
     if degenerate > 0 {

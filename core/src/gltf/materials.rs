@@ -3,7 +3,7 @@
 use crate::gltf::document::{At, Document};
 use crate::gltf::error::{LoadError, Problems};
 use crate::gltf::textures::{TextureTable, UvSets};
-use crate::scene::material::{Coverage, Material, Sides, Textured, Volume};
+use crate::scene::material::{Coverage, Material, RoughnessMap, Sides, Textured, Volume};
 use crate::scene::texture::Encoding;
 use glam::{Vec3, Vec4};
 
@@ -15,6 +15,8 @@ pub(crate) struct Read {
     /// JSON pointer; empty for the default material.
     pub(crate) pointer: String,
 }
+
+const SPECULAR_GLOSSINESS: &str = "KHR_materials_pbrSpecularGlossiness";
 
 /// Collects what a material refers to.
 struct Reader<'a> {
@@ -68,7 +70,9 @@ impl Reader<'_> {
     }
 
     fn core(&mut self, item: &At<'_>, material: &mut Material) -> Result<(), LoadError> {
-        if let Some(pbr) = item.object("pbrMetallicRoughness")? {
+        if let Some(extension) = item.extension(SPECULAR_GLOSSINESS)? {
+            self.specular_glossiness(&extension, material)?;
+        } else if let Some(pbr) = item.object("pbrMetallicRoughness")? {
             if let Some(factor) = pbr.numbers::<4>("baseColorFactor")? {
                 material.base_color.factor = Vec4::from(factor.map(|v| v.clamp(0.0, 1.0) as f32));
             }
@@ -76,13 +80,15 @@ impl Reader<'_> {
             material.metallic = pbr.share("metallicFactor")?.unwrap_or(1.0);
             material.roughness = pbr.share("roughnessFactor")?.unwrap_or(1.0);
             if material.metallic > 0.0 || material.roughness > 0.0 {
-                material.metallic_roughness = self.slot(&pbr, "metallicRoughnessTexture", Encoding::Linear)?;
+                let slot = self.slot(&pbr, "metallicRoughnessTexture", Encoding::Linear)?;
+                material.roughness_map = slot.map(RoughnessMap::MetallicRoughness);
             }
         }
         if let Some(info) = item.object("normalTexture")? {
             let scale = info.number("scale")?.unwrap_or(1.0) as f32;
             if scale != 0.0 && scale.is_finite() {
-                material.normal = self.slot(item, "normalTexture", Encoding::Linear)?.map(|slot| (slot, scale));
+                material.normal =
+                    self.slot(item, "normalTexture", Encoding::Linear)?.map(|slot| (slot, scale));
             }
         }
         material.sides = if item.flag("doubleSided")?.unwrap_or(false) { Sides::Both } else { Sides::Front };
@@ -92,6 +98,22 @@ impl Reader<'_> {
             Some("MASK") => Coverage::Mask { cutoff: item.number("alphaCutoff")?.unwrap_or(0.5) as f32 },
             Some(_) => return Err(item.error("\"alphaMode\" must be OPAQUE, MASK or BLEND")),
         };
+        Ok(())
+    }
+
+    /// The archived model: a diffuse colour under a reflection of any colour. Over 0.04, what a refractive index
+    /// of 1.5 reflects, that colour is `specularColorFactor`; both models limit the reflection to 1.
+    fn specular_glossiness(&mut self, at: &At<'_>, material: &mut Material) -> Result<(), LoadError> {
+        if let Some(factor) = at.numbers::<4>("diffuseFactor")? {
+            material.base_color.factor = Vec4::from(factor.map(|v| v.clamp(0.0, 1.0) as f32));
+        }
+        material.base_color.texture = self.slot(at, "diffuseTexture", Encoding::Srgb)?;
+        material.metallic = 0.0;
+        material.roughness = 1.0 - at.share("glossinessFactor")?.unwrap_or(1.0);
+        material.specular_color.factor = colour(at, "specularFactor")?.unwrap_or(Vec3::ONE) / 0.04;
+        let texture = self.slot(at, "specularGlossinessTexture", Encoding::Srgb)?;
+        material.specular_color.texture = texture;
+        material.roughness_map = texture.map(RoughnessMap::Glossiness);
         Ok(())
     }
 
@@ -165,7 +187,11 @@ fn absorption(volume: &At<'_>) -> Result<Vec3, LoadError> {
     }
     let one = |c: f32| (-libm::log(f64::from(c.max(f32::MIN_POSITIVE))) / distance) as f32;
     let absorption = Vec3::new(one(colour.x), one(colour.y), one(colour.z)).max(Vec3::ZERO);
-    if absorption.is_finite() { Ok(absorption) } else { Err(volume.error("absorbs beyond the range of numbers")) }
+    if absorption.is_finite() {
+        Ok(absorption)
+    } else {
+        Err(volume.error("absorbs beyond the range of numbers"))
+    }
 }
 
 /// Leaves out a coverage rule that changes nothing.

@@ -27,3 +27,6 @@ mod tangents;
 mod textures;
 mod topology;
 mod uri;
+
+#[cfg(test)]
+mod tests;

@@ -26,7 +26,8 @@ pub(crate) fn read<'a>(document: &'a Document, problems: &mut Problems) -> Resul
     let roots = find_roots(document, &children, problems)?;
     let mut tree = Tree { nodes: Vec::new(), world: vec![None; items.len()] };
     // A stack of our own: a chain of nodes may be as deep as the document is long.
-    let mut stack: Vec<(usize, DAffine3)> = roots.into_iter().rev().map(|n| (n, DAffine3::IDENTITY)).collect();
+    let mut stack: Vec<(usize, DAffine3)> =
+        roots.into_iter().rev().map(|n| (n, DAffine3::IDENTITY)).collect();
     while let Some((index, parent)) = stack.pop() {
         let at = &items[index];
         if tree.world[index].is_some() {
@@ -102,7 +103,10 @@ fn find_roots(
     for at in scene.elements("nodes")? {
         let index = at.as_index("nodes", children.parents.len())?;
         if let Some(parent) = children.parents[index] {
-            problems.add(&at.pointer, format!("/nodes/{index} is a child of /nodes/{parent}: its parents are left out"));
+            problems.add(
+                &at.pointer,
+                format!("/nodes/{index} is a child of /nodes/{parent}: its parents are left out"),
+            );
         }
         roots.push(index);
     }

@@ -51,7 +51,8 @@ impl Report {
         let emissive: Vec<u64> = (scene.meshes.iter())
             .map(|mesh| mesh.materials.iter().filter(|m| scene.materials[m.index()].emits()).count() as u64)
             .collect();
-        let placed = |count: &dyn Fn(usize) -> u64| scene.instances.iter().map(|i| count(i.mesh.index())).sum();
+        let placed =
+            |count: &dyn Fn(usize) -> u64| scene.instances.iter().map(|i| count(i.mesh.index())).sum();
         let mut pictures: Vec<_> = scene.textures.iter().map(|t| &t.picture).collect();
         pictures.sort_by_key(|picture| std::sync::Arc::as_ptr(picture));
         pictures.dedup_by_key(|picture| std::sync::Arc::as_ptr(picture));

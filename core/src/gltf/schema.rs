@@ -99,7 +99,9 @@ impl<'a> Walk<'a, '_> {
         for field in schema.fields {
             match members.get(field.name) {
                 Some(value) => self.within(Step::Key(field.name), |walk| walk.value(value, &field.kind)),
-                None if field.presence == Presence::Needed => self.report(format!("\"{}\" is missing", field.name)),
+                None if field.presence == Presence::Needed => {
+                    self.report(format!("\"{}\" is missing", field.name));
+                }
                 None => {}
             }
         }
@@ -125,18 +127,21 @@ impl<'a> Walk<'a, '_> {
 
     fn value(&mut self, value: &'a Value, kind: &'static Kind) {
         match kind {
-            Kind::Any => {}
             Kind::Text if !value.is_string() => self.mismatch("a string", value),
             Kind::Flag if !value.is_boolean() => self.mismatch("true or false", value),
-            Kind::Text | Kind::Flag => {}
+            Kind::Any | Kind::Text | Kind::Flag => {}
             Kind::Whole(least) => match whole(value) {
-                Some(number) if number < *least => self.report(format!("is {number}, but must be at least {least}")),
+                Some(number) if number < *least => {
+                    self.report(format!("is {number}, but must be at least {least}"));
+                }
                 Some(_) => {}
                 None => self.mismatch("a whole number that is not negative", value),
             },
             Kind::Number(least, most) => self.number(value, *least, *most),
             Kind::Above(limit, most) => match value.as_f64() {
-                Some(number) if number <= *limit => self.report(format!("is {number}, but must be above {limit}")),
+                Some(number) if number <= *limit => {
+                    self.report(format!("is {number}, but must be above {limit}"));
+                }
                 _ => self.number(value, *limit, *most),
             },
             Kind::Numbers(lengths, least, most) => self.numbers(value, lengths, *least, *most),
@@ -161,7 +166,9 @@ impl<'a> Walk<'a, '_> {
 
     fn number(&mut self, value: &Value, least: f64, most: f64) {
         match value.as_f64() {
-            Some(number) if number < least => self.report(format!("is {number}, but must be at least {least}")),
+            Some(number) if number < least => {
+                self.report(format!("is {number}, but must be at least {least}"));
+            }
             Some(number) if number > most => self.report(format!("is {number}, but must be at most {most}")),
             Some(_) => {}
             None => self.mismatch("a number", value),
@@ -238,7 +245,10 @@ mod tests {
             (r"{}", r#" "asset" is missing"#),
             (r#"{"asset": {"version": "2.0"}, "nodes": {}}"#, "/nodes should be an array, but is an object"),
             (r#"{"asset": {"version": "2.0"}, "nodes": []}"#, "/nodes is empty: leave it out"),
-            (r#"{"asset": {"version": "2.0"}, "nodes": [{"mesh": 2}]}"#, "/nodes/0/mesh refers to 2 of /meshes, but there are only 0"),
+            (
+                r#"{"asset": {"version": "2.0"}, "nodes": [{"mesh": 2}]}"#,
+                "/nodes/0/mesh refers to 2 of /meshes, but there are only 0",
+            ),
             (
                 r#"{"asset": {"version": "2.0"}, "materials": [{"alphaMode": "WAT"}]}"#,
                 "/materials/0/alphaMode should be one of OPAQUE, MASK, BLEND",

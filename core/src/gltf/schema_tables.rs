@@ -2,8 +2,8 @@
 //! read.
 
 use crate::gltf::schema::Kind::{
-    Above, Any, AttributeLists, Attributes, Codes, Flag, Index, Indices, List, Number, Numbers, Object, Text, Whole,
-    Words,
+    Above, Any, AttributeLists, Attributes, Codes, Flag, Index, Indices, List, Number, Numbers, Object, Text,
+    Whole, Words,
 };
 use crate::gltf::schema::{Field, Kind, Presence, Schema};
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -132,6 +132,7 @@ static MATERIAL: Schema = Schema {
     extensions: &[
         ("KHR_materials_emissive_strength", &EMISSIVE_STRENGTH),
         ("KHR_materials_ior", &IOR),
+        ("KHR_materials_pbrSpecularGlossiness", &SPECULAR_GLOSSINESS),
         ("KHR_materials_specular", &SPECULAR),
         ("KHR_materials_transmission", &TRANSMISSION),
         ("KHR_materials_volume", &VOLUME),
@@ -155,6 +156,14 @@ static SPECULAR: Schema = plain(&[
     free("specularTexture", Object(&TEXTURE_INFO)),
     free("specularColorFactor", Numbers(&[3], 0.0, MOST)),
     free("specularColorTexture", Object(&TEXTURE_INFO)),
+]);
+
+static SPECULAR_GLOSSINESS: Schema = plain(&[
+    free("diffuseFactor", Numbers(&[4], 0.0, 1.0)),
+    free("diffuseTexture", Object(&TEXTURE_INFO)),
+    free("specularFactor", COLOUR),
+    free("glossinessFactor", UNIT),
+    free("specularGlossinessTexture", Object(&TEXTURE_INFO)),
 ]);
 
 static TRANSMISSION: Schema =
@@ -200,11 +209,8 @@ static TEXTURE: Schema = Schema {
 
 static TEXTURE_SOURCE: Schema = plain(&[free("source", Index("/images"))]);
 
-static IMAGE: Schema = plain(&[
-    free("uri", Text),
-    free("mimeType", Text),
-    free("bufferView", Index("/bufferViews")),
-]);
+static IMAGE: Schema =
+    plain(&[free("uri", Text), free("mimeType", Text), free("bufferView", Index("/bufferViews"))]);
 
 static SAMPLER: Schema = plain(&[
     free("magFilter", Codes(&[9728, 9729])),

@@ -80,7 +80,8 @@ fn weights(at: &crate::gltf::document::At<'_>) -> Result<Option<Vec<f64>>, LoadE
     if at.get("weights").is_none() {
         return Ok(None);
     }
-    let number = |w: &crate::gltf::document::At<'_>| w.value.as_f64().ok_or_else(|| w.error("should be a number"));
+    let number =
+        |w: &crate::gltf::document::At<'_>| w.value.as_f64().ok_or_else(|| w.error("should be a number"));
     at.elements("weights")?.iter().map(number).collect::<Result<_, _>>().map(Some)
 }
 
@@ -164,13 +165,20 @@ fn check_promised(source: Source<'_>, shapes: &[Shape]) -> Result<(), LoadError>
     Ok(())
 }
 
-fn check_joints(geometry: &Geometry, shape: &Shape, pointer: &str, source: Source<'_>) -> Result<(), LoadError> {
+fn check_joints(
+    geometry: &Geometry,
+    shape: &Shape,
+    pointer: &str,
+    source: Source<'_>,
+) -> Result<(), LoadError> {
     let greatest = geometry.influences.as_ref().map_or(0, skin::Influences::greatest);
     if shape.skin.is_none() || greatest < shape.joints.len() {
         return Ok(());
     }
     let joints = shape.joints.len();
-    Err(source.document.error(pointer, format!("a vertex hangs on joint {greatest}, but its skin has only {joints}")))
+    Err(source
+        .document
+        .error(pointer, format!("a vertex hangs on joint {greatest}, but its skin has only {joints}")))
 }
 
 fn point_out_thin_glass(geometry: &Geometry, read: &materials::Read, problems: &mut Problems) {

@@ -32,7 +32,9 @@ impl Influences {
             let first = weights.len();
             for (joint, weight) in sets {
                 joints.extend(joint.get_joints(v as usize));
-                weights.extend(weight.get::<4>(v as usize).map(|w| if w > 0.0 && w.is_finite() { w } else { 0.0 }));
+                weights.extend(
+                    weight.get::<4>(v as usize).map(|w| if w > 0.0 && w.is_finite() { w } else { 0.0 }),
+                );
             }
             let sum: f32 = weights[first..].iter().sum();
             if sum > 0.0 && sum.is_finite() {

@@ -35,7 +35,7 @@ pub(crate) fn survey(bundle: &Bundle, source: Source<'_>, used: &[usize], proble
     }
     let mut pixels = PIXELS;
     for index in (0..source.document.count("images")).filter(|index| used.binary_search(index).is_err()) {
-        if let Err(error) = pictures::try_decode(bundle, source, index, &mut pixels) {
+        if let Err(error) = pictures::try_decode(bundle, source, index, &mut pixels, problems) {
             problems.add_error(&error);
         }
     }

@@ -6,7 +6,7 @@ use std::cmp::Ordering;
 
 /// Computes tangents from positions, normals and the given texture coordinates.
 ///
-/// As MikkTSpace has it, corners of the same position, normal and coordinates share a tangent if their
+/// As `MikkTSpace` has it, corners of the same position, normal and coordinates share a tangent if their
 /// triangles are laid out the same way round; a vertex where the layout turns over is split in two. The
 /// shared tangent is the mean of ∂position/∂u over the triangles around, weighted by the corner's angle.
 /// What has no layout at all gets no tangent and no bump.

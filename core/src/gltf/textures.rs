@@ -56,7 +56,8 @@ impl TextureTable {
         let index = info.need("index")?.as_index("textures", document.count("textures"))?;
         let item = document.item("textures", index)?;
         let Some(image) = picture_of(document, &item)? else {
-            problems.add(&item.pointer, "the texture has no picture that can be read: its material goes without");
+            problems
+                .add(&item.pointer, "the texture has no picture that can be read: its material goes without");
             return Ok(None);
         };
         let (wrap, filter) = sampler(document, &item)?;

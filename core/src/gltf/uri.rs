@@ -139,7 +139,10 @@ mod tests {
 
     #[test]
     fn data_uris_are_decoded() {
-        assert_eq!(resolve("data:application/octet-stream;base64,AAEC/w=="), Ok(Target::Data(vec![0, 1, 2, 255])));
+        assert_eq!(
+            resolve("data:application/octet-stream;base64,AAEC/w=="),
+            Ok(Target::Data(vec![0, 1, 2, 255]))
+        );
         assert_eq!(resolve("data:;base64,AAEC%2Fw"), Ok(Target::Data(vec![0, 1, 2, 255])));
         for broken in ["data:image/png", "data:image/png,hello", "data:;base64,@@@@", "data:x;;base64,AAEC"] {
             assert!(resolve(broken).is_err(), "{broken}");

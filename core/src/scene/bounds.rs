@@ -22,11 +22,13 @@ impl Bounds {
     }
 
     /// The box around both.
+    #[must_use]
     pub fn union(self, other: Self) -> Self {
         Self { lower: self.lower.min(other.lower), upper: self.upper.max(other.upper) }
     }
 
     /// The box around the eight corners moved by `transform`: it may be larger than what it holds.
+    #[must_use]
     pub fn transformed(self, transform: &DAffine3) -> Self {
         let mut moved = Self::EMPTY;
         if self.is_empty() {

@@ -77,7 +77,8 @@ impl<T> Textured<T> {
 }
 
 /// What a surface is made of: glTF's core model with its specular, ior, transmission, volume and
-/// emissive-strength extensions.
+/// emissive-strength extensions. `KHR_materials_pbrSpecularGlossiness` is a dielectric with a coloured reflection
+/// in it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Material {
     /// Its name; may be empty.
@@ -88,8 +89,8 @@ pub struct Material {
     pub metallic: f32,
     /// Perceptual roughness.
     pub roughness: f32,
-    /// Factors of roughness (green) and metallic (blue).
-    pub metallic_roughness: Option<TextureSlot>,
+    /// What varies roughness and metallic.
+    pub roughness_map: Option<RoughnessMap>,
     /// A normal map and the scale of its x and y.
     pub normal: Option<(TextureSlot, f32)>,
     /// Radiance, W/(sr·m²) a channel.
@@ -110,6 +111,24 @@ pub struct Material {
     pub coverage: Coverage,
 }
 
+/// A texture that varies how rough a surface is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum RoughnessMap {
+    /// Factors of roughness (green) and metallic (blue).
+    MetallicRoughness(TextureSlot),
+    /// A factor of glossiness (alpha), which is 1 − roughness.
+    Glossiness(TextureSlot),
+}
+
+impl RoughnessMap {
+    /// The texture.
+    pub fn slot(&self) -> &TextureSlot {
+        match self {
+            Self::MetallicRoughness(slot) | Self::Glossiness(slot) => slot,
+        }
+    }
+}
+
 /// A solid's inside.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Volume {
@@ -125,7 +144,7 @@ impl Default for Material {
             base_color: Textured::constant(Vec4::ONE),
             metallic: 1.0,
             roughness: 1.0,
-            metallic_roughness: None,
+            roughness_map: None,
             normal: None,
             emission: Textured::constant(Vec3::ZERO),
             sides: Sides::Front,
@@ -172,7 +191,7 @@ impl Material {
     pub fn slots(&self) -> impl Iterator<Item = &TextureSlot> {
         [
             self.base_color.texture.as_ref(),
-            self.metallic_roughness.as_ref(),
+            self.roughness_map.as_ref().map(RoughnessMap::slot),
             self.normal.as_ref().map(|(slot, _)| slot),
             self.emission.texture.as_ref(),
             self.specular.texture.as_ref(),
@@ -210,8 +229,17 @@ impl Material {
 
     /// Roughness and metallic.
     pub fn roughness_and_metallic(&self, textures: &[Texture], at: &SurfaceCoordinates) -> (f32, f32) {
-        let texel = self.metallic_roughness.map_or(Vec4::ONE, |slot| slot.sample(textures, at));
-        ((self.roughness * texel.y).clamp(0.0, 1.0), (self.metallic * texel.z).clamp(0.0, 1.0))
+        let (roughness, metallic) = match self.roughness_map {
+            None => (self.roughness, self.metallic),
+            Some(RoughnessMap::MetallicRoughness(slot)) => {
+                let texel = slot.sample(textures, at);
+                (self.roughness * texel.y, self.metallic * texel.z)
+            }
+            Some(RoughnessMap::Glossiness(slot)) => {
+                (1.0 - (1.0 - self.roughness) * slot.sample(textures, at).w, self.metallic)
+            }
+        };
+        (roughness.clamp(0.0, 1.0), metallic.clamp(0.0, 1.0))
     }
 
     /// Strength and colour of the dielectric reflection.

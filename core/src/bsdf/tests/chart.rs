@@ -23,6 +23,8 @@ pub(super) enum Kind {
     Through,
     /// The other side, refracted with this relative index.
     Refracted(f64),
+    /// What of the other side no facet refracts to; by the normal as for `Through`.
+    Beyond(f64),
 }
 
 impl Chart {
@@ -35,9 +37,10 @@ impl Chart {
     /// `None` where the facet sends nothing to this side.
     pub(super) fn direction(&self, a: f64, b: f64) -> Option<DVec3> {
         let wi = self.unlimited(a, b)?;
-        let inside = if matches!(self.kind, Kind::Refracted(_)) { wi.z < 0.0 } else { wi.z > 0.0 };
-        let turned = if self.kind == Kind::Through { -self.flip } else { self.flip };
-        inside.then(|| wi.with_z(wi.z * turned))
+        let refracted = matches!(self.kind, Kind::Refracted(_));
+        let turned = if refracted || self.kind == Kind::Mirrored { self.flip } else { -self.flip };
+        let direction = wi.with_z(wi.z * turned);
+        ((wi.z < 0.0) == refracted && self.covers(direction)).then_some(direction)
     }
 
     fn unlimited(&self, a: f64, b: f64) -> Option<DVec3> {
@@ -49,7 +52,7 @@ impl Chart {
             return None;
         }
         match self.kind {
-            Kind::Mirrored | Kind::Through => Some(2.0 * dot * normal - self.wo),
+            Kind::Mirrored | Kind::Through | Kind::Beyond(_) => Some(2.0 * dot * normal - self.wo),
             Kind::Refracted(eta) => {
                 let squared = 1.0 - (1.0 - dot * dot) / (eta * eta);
                 (squared > 0.0).then(|| normal * (dot / eta - squared.sqrt()) - self.wo / eta)
@@ -72,7 +75,7 @@ impl Chart {
     pub(super) fn locate(&self, wi: Vec3) -> (f64, f64) {
         let wi = wi.as_dvec3().normalize();
         let normal = match self.kind {
-            Kind::Mirrored | Kind::Through => self.wo + wi.with_z(wi.z.abs()),
+            Kind::Mirrored | Kind::Through | Kind::Beyond(_) => self.wo + wi.with_z(wi.z.abs()),
             Kind::Refracted(eta) => {
                 let normal = self.wo + wi.with_z(-wi.z.abs()) * eta;
                 normal * normal.z.signum()
@@ -83,7 +86,20 @@ impl Chart {
         (a, (libm::atan2(normal.y, normal.x) / TAU).rem_euclid(1.0))
     }
 
-    pub(super) fn covers(&self, wi: Vec3) -> bool {
-        (f64::from(wi.z) * self.flip > 0.0) == (self.kind == Kind::Mirrored)
+    /// Whether a direction is of this chart.
+    pub(super) fn covers(&self, wi: DVec3) -> bool {
+        let wi = wi.with_z(wi.z * self.flip);
+        match self.kind {
+            Kind::Mirrored => wi.z > 0.0,
+            Kind::Through => wi.z < 0.0,
+            Kind::Refracted(eta) => wi.z < 0.0 && self.is_refracted(wi, eta),
+            Kind::Beyond(eta) => wi.z < 0.0 && !self.is_refracted(wi, eta),
+        }
+    }
+
+    fn is_refracted(&self, wi: DVec3, eta: f64) -> bool {
+        let half = self.wo + wi * eta;
+        let normal = half * half.z.signum();
+        self.wo.dot(normal) > 0.0 && wi.dot(normal) < 0.0
     }
 }

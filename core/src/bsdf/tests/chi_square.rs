@@ -44,7 +44,11 @@ fn expected(bsdf: &Bsdf, wo: Vec3, chart: &Chart) -> Vec<f64> {
 
 /// The standard normal deviate of a χ² test of samples against densities.
 fn deviate(bsdf: &Bsdf, wo: Vec3, alpha: f32, through: Kind, seed: u64) -> f64 {
-    let charts = [Chart::new(wo, alpha, Kind::Mirrored), Chart::new(wo, alpha, through)];
+    let kinds = match through {
+        Kind::Refracted(eta) => vec![Kind::Mirrored, through, Kind::Beyond(eta)],
+        _ => vec![Kind::Mirrored, through],
+    };
+    let charts: Vec<Chart> = kinds.into_iter().map(|kind| Chart::new(wo, alpha, kind)).collect();
     let mut wanted: Vec<f64> = charts.iter().flat_map(|chart| expected(bsdf, wo, chart)).collect();
     let cells = wanted.len();
     let mut counted = vec![0_u32; cells];
@@ -66,12 +70,13 @@ fn deviate(bsdf: &Bsdf, wo: Vec3, alpha: f32, through: Kind, seed: u64) -> f64 {
             }
             SampleKind::Smooth { pdf, .. } => {
                 assert!(pdf > 0.0);
-                let k = usize::from(!charts[0].covers(sample.wi));
+                let wi = sample.wi.as_dvec3();
+                let k = charts.iter().position(|chart| chart.covers(wi)).expect("the charts cover all");
                 let (a, b) = charts[k].locate(sample.wi);
                 // What has less slope than the chart's least is counted apart.
                 if (0.0..1.0).contains(&a) {
                     let (i, j) = ((a * RADIAL as f64) as usize, (b * AROUND as f64) as usize);
-                    counted[k * cells / 2 + i * AROUND + j.min(AROUND - 1)] += 1;
+                    counted[k * RADIAL * AROUND + i * AROUND + j.min(AROUND - 1)] += 1;
                 } else {
                     absorbed += 1;
                 }

@@ -59,7 +59,9 @@ fn white_glass_gains_nothing() {
             for angle in ANGLES.into_iter().flat_map(|angle| [angle, 180.0 - angle]) {
                 let found = albedo(&bsdf, tilted(angle, 2.0), 1 << 13).max_element();
                 assert!(found < 1.0 + 1e-3, "η {ior} α {alpha} at {angle}°: {found}");
-                assert!(found > if alpha < 1e-3 { 1.0 - 1e-5 } else { 0.0 }, "η {ior} α {alpha} at {angle}°");
+                // The margins of the table; exact where nothing is tabulated.
+                let least = if alpha < 1e-3 { 1.0 - 1e-5 } else { 0.98 };
+                assert!(found > least, "η {ior} α {alpha} at {angle}°: {found}");
             }
         }
     }

@@ -1,0 +1,8 @@
+//! Small scenes built by code, read back.
+
+mod appearance;
+mod builder;
+mod bundles;
+mod geometry;
+mod placement;
+mod refusals;
