@@ -51,6 +51,9 @@ pub struct SceneContents {
     pub cameras: Vec<String>,
     /// Width over height of the first camera, where it says.
     pub aspect_ratio: Option<f64>,
+    /// The same of each camera.
+    #[serde(default)]
+    pub camera_aspect_ratios: Vec<Option<f64>>,
     /// Emitters of each kind.
     pub lights: LightCounts,
     /// What a render of it needs.

@@ -7,6 +7,7 @@ use crate::{
     inspect::inspect,
     store::{error::StoreError, sqlite::Sqlite},
 };
+use ovtigre_core::gltf::limits::Limits;
 use std::{
     fs::{File, TryLockError},
     io,
@@ -83,7 +84,7 @@ pub async fn start(config: ServeConfig) -> Result<Serving, ServeError> {
     let address = listener.local_addr().map_err(listening)?;
     let store = Arc::new(Sqlite::open(&config.data.join("farm.sqlite")).await?);
     let blobs = Blobs::folder(&config.data.join("blobs"))?;
-    let farm = Farm::open(store, blobs, inspect(), Rules::default()).await?;
+    let farm = Farm::open(store, blobs, inspect(Limits::default()), Rules::default()).await?;
     let closing = CancellationToken::new();
     let closed = closing.clone().cancelled_owned();
     let server = axum::serve(listener, router(Arc::clone(&farm))).with_graceful_shutdown(closed);

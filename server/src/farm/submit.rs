@@ -31,6 +31,8 @@ const REPLICATES_MAX: u32 = 256;
 const NAME_MAX: usize = 200;
 /// Longest idempotency key.
 const KEY_MAX: usize = 255;
+/// What a scene without light needs, as its report names it.
+const DEFAULT_SKY: &str = "default sky";
 /// Width over height where a camera does not say.
 const ASPECT_DEFAULT: f64 = 16.0 / 9.0;
 
@@ -140,6 +142,7 @@ pub fn resolve(
     if !faults.is_empty() {
         return Err(faults);
     }
+    let lit = if request.environment.is_some() { Lit::ByRequest } else { Lit::ByScene };
     let spec = JobSpec {
         settings: Settings {
             size,
@@ -161,7 +164,7 @@ pub fn resolve(
             Some(MethodRequest::Path) => "asked for".to_owned(),
             _ => "samples the whole rendering equation from the eye, with next event".to_owned(),
         },
-        warnings: warnings(scene, camera, samples, replicates),
+        warnings: warnings(scene, lit, camera, samples, replicates),
         request,
     };
     fits(&spec, rules).map(|()| spec)
@@ -185,6 +188,15 @@ fn unsupported(request: &JobRequest, note: &mut impl FnMut(&str, String)) {
     }
     if !request.layers.is_empty() {
         note("/layers", "layers are not supported yet: leave 'layers' out".to_owned());
+    }
+    if request.strategies.is_some() {
+        note("/strategies", "strategies are not supported yet: leave 'strategies' out".to_owned());
+    }
+    if request.weights.is_some() {
+        note("/weights", "weights are not supported yet: leave 'weights' out".to_owned());
+    }
+    if request.shutter.is_some_and(|times| times != [0.0, 0.0]) {
+        note("/shutter", "only a still, '0,0', is supported yet: leave 'shutter' out".to_owned());
     }
 }
 
@@ -234,8 +246,12 @@ fn camera(request: &JobRequest, scene: &SceneContents) -> std::result::Result<Ca
     }
 }
 
-fn default_size(scene: &SceneContents, _camera: CameraChoice) -> Size {
-    let aspect = scene.aspect_ratio.filter(|a| a.is_finite() && *a > 0.0).unwrap_or(ASPECT_DEFAULT);
+fn default_size(scene: &SceneContents, camera: CameraChoice) -> Size {
+    let says = match camera {
+        CameraChoice::Framed => None,
+        CameraChoice::Index(n) => scene.camera_aspect_ratios.get(n as usize).copied().flatten(),
+    };
+    let aspect = says.filter(|a| a.is_finite() && *a > 0.0).unwrap_or(ASPECT_DEFAULT);
     let height = (f64::from(WIDTH_DEFAULT) / aspect).round().clamp(1.0, f64::from(Size::SIDE_MAX));
     Size { width: WIDTH_DEFAULT, height: height as u32 }
 }
@@ -268,7 +284,20 @@ fn environment(request: &JobRequest) -> Option<Environment> {
     Some(Environment { source, rotation_degrees: request.environment_rotation.unwrap_or(0.0) })
 }
 
-fn warnings(scene: &SceneContents, camera: CameraChoice, samples: u32, replicates: u32) -> Vec<String> {
+/// Who says where light comes from.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Lit {
+    ByScene,
+    ByRequest,
+}
+
+fn warnings(
+    scene: &SceneContents,
+    lit: Lit,
+    camera: CameraChoice,
+    samples: u32,
+    replicates: u32,
+) -> Vec<String> {
     let mut warnings = Vec::new();
     if camera == CameraChoice::Framed {
         warnings.push("the scene has no camera: it is framed".to_owned());
@@ -278,6 +307,9 @@ fn warnings(scene: &SceneContents, camera: CameraChoice, samples: u32, replicate
         warnings.push(format!(
             "{samples} samples are not a multiple of {replicates} replicates: {drawn} are drawn"
         ));
+    }
+    if lit == Lit::ByScene && scene.needs.iter().any(|need| need == DEFAULT_SKY) {
+        warnings.push("nothing in the scene emits light: it gets a default sky".to_owned());
     }
     warnings.extend(scene.warnings.iter().map(|w| {
         if w.pointer.is_empty() { w.detail.clone() } else { format!("{}: {}", w.pointer, w.detail) }
