@@ -178,7 +178,8 @@ mod tests {
     fn a_binary_scene_with_files_beside_it_is_packed_and_one_without_is_sent_as_it_is() {
         let folder = folder(SCENE);
         for (json, packed) in [(SCENE, true), (r#"{"asset":{"version":"2.0"}}"#, false)] {
-            let padded = format!("{json:1$}", json.len().next_multiple_of(4));
+            let length = json.len().next_multiple_of(4);
+            let padded = format!("{json:length$}");
             let mut glb = b"glTF\x02\0\0\0".to_vec();
             glb.extend((padded.len() as u32 + 20).to_le_bytes());
             glb.extend((padded.len() as u32).to_le_bytes());

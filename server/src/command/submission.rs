@@ -69,10 +69,13 @@ impl Submission {
             let reason = status.reason.as_deref().unwrap_or("the farm does not say why");
             return Err(CommandError::failed(format!("the job failed: {reason}")));
         }
-        if status.samples_done <= 0.0 {
-            return Err(CommandError::stopped("stopped before the first sample: there is no picture"));
-        }
-        self.output.fetch(client, &status.id).await?;
+        let exr = client.image(&status.id, None, None).await.map_err(|error| match error.status() {
+            Some(404) if status.state == JobState::Cancelled => {
+                CommandError::stopped("stopped before there was a picture")
+            }
+            _ => error.into(),
+        })?;
+        self.output.write(exr, client, &status.id).await?;
         if let Some(path) = &self.flags.report {
             report::write(client, status, path).await?;
         }
