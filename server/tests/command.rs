@@ -83,7 +83,9 @@ fn picture(path: &Path) -> Layers {
 }
 
 fn signal(child: &Child, name: &str) {
-    assert!(Command::new("kill").args([format!("-{name}"), child.id().to_string()]).status().unwrap().success());
+    assert!(
+        Command::new("kill").args([format!("-{name}"), child.id().to_string()]).status().unwrap().success()
+    );
 }
 
 /// A farm with one worker, and its address; ends with this value.
@@ -91,7 +93,8 @@ struct Farm(Child, String);
 
 impl Farm {
     fn start(folder: &Path) -> Self {
-        let mut child = command(folder, "serve --listen 127.0.0.1:0 --data farm --workers 1 --threads 1 --log error");
+        let mut child =
+            command(folder, "serve --listen 127.0.0.1:0 --data farm --workers 1 --threads 1 --log error");
         let mut child = child.stderr(Stdio::inherit()).spawn().unwrap();
         let mut address = String::new();
         BufReader::new(child.stdout.take().unwrap()).read_line(&mut address).unwrap();
@@ -117,7 +120,9 @@ fn one_command_renders_a_scene() {
     assert!(fs::read(at("lamp.png")).unwrap().starts_with(b"\x89PNG"));
     let layers = picture(&at("lamp.exr"));
     assert_eq!((layers.width, layers.height), (48, 32));
-    assert!(layers.channels["G"].iter().all(|x| x.is_finite()) && layers.channels["G"].iter().any(|x| *x > 0.01));
+    assert!(
+        layers.channels["G"].iter().all(|x| x.is_finite()) && layers.channels["G"].iter().any(|x| *x > 0.01)
+    );
     assert!(layers.channels.contains_key("error.G"));
     let report: Value = serde_json::from_slice(&fs::read(at("report.json")).unwrap()).unwrap();
     let rows = report["rows"].as_array().unwrap();
@@ -159,7 +164,9 @@ fn a_farm_is_asked_from_the_command_line() {
 #[test]
 fn interrupted_once_it_keeps_the_picture_so_far() {
     let folder = scene();
-    let child = command(folder.path(), "render lamp.gltf --size 64x64 --samples 4000000 --threads 1").spawn().unwrap();
+    let child = command(folder.path(), "render lamp.gltf --size 64x64 --samples 4000000 --threads 1")
+        .spawn()
+        .unwrap();
     std::thread::sleep(Duration::from_secs(4));
     signal(&child, "INT");
     let began = Instant::now();
@@ -175,12 +182,15 @@ fn interrupted_once_it_keeps_the_picture_so_far() {
 fn no_worker_outlives_a_killed_render() {
     let folder = scene();
     let data = folder.path().join("farm");
-    let arguments = format!("render lamp.gltf --size 64x64 --samples 4000000 --threads 1 --data {}", data.display());
+    let arguments =
+        format!("render lamp.gltf --size 64x64 --samples 4000000 --threads 1 --data {}", data.display());
     let mut child = command(folder.path(), &arguments).spawn().unwrap();
     let workers = || {
         let processes = fs::read_dir("/proc").unwrap().filter_map(Result::ok);
         let lines = processes.filter_map(|process| fs::read_to_string(process.path().join("cmdline")).ok());
-        lines.filter(|line| line.contains("--until-stdin-closes") && line.contains(data.to_str().unwrap())).count()
+        lines
+            .filter(|line| line.contains("--until-stdin-closes") && line.contains(data.to_str().unwrap()))
+            .count()
     };
     let within = |seconds: u64, holds: &dyn Fn() -> bool| {
         let began = Instant::now();
@@ -211,8 +221,19 @@ fn what_cannot_be_done_is_one_clear_line() {
         assert!(refused(&format!("{verb} text.gltf"), 2).contains("text.gltf"));
         assert!(refused(&format!("{verb} lost.gltf"), 2).contains("lost.bin"));
     }
-    for flags in ["-o x.jpg", "-o no/x.exr", "--camera 7", "--environment nothing.exr", "--layer a=LE", "--paths LDE",
-        "--method photon", "--strategies 1,2", "--weights power", "--shutter 0,1", "--region 0,0,99999,1"] {
+    for flags in [
+        "-o x.jpg",
+        "-o no/x.exr",
+        "--camera 7",
+        "--environment nothing.exr",
+        "--layer a=LE",
+        "--paths LDE",
+        "--method photon",
+        "--strategies 1,2",
+        "--weights power",
+        "--shutter 0,1",
+        "--region 0,0,99999,1",
+    ] {
         refused(&format!("render lamp.gltf --size 16x16 --samples 1 {flags}"), 2);
     }
     refused("render lamp.gltf --samples many", 2);
