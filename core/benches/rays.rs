@@ -1,5 +1,8 @@
 //! Million rays a second on one thread: primary, diffuse-bounce and shadow rays on three generated scenes.
+//!
+//! Times are those of the processor, not of the clock on the wall, so that other work on the machine counts less.
 
+use criterion::measurement::{Measurement, ValueFormatter, WallTime};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::{Affine3A, EulerRot, Quat, Vec3};
 use ovtigre_core::math::frame::Frame;
@@ -15,7 +18,42 @@ use std::time::Duration;
 /// Pixels on each side of the frame.
 const FRAME: usize = 512;
 
-/// Numbers that look random (SplitMix64).
+/// Time that this thread spent on a processor; Linux alone tells it without further crates.
+struct ThreadTime(WallTime);
+
+impl ThreadTime {
+    fn nanoseconds() -> u64 {
+        let statistics =
+            std::fs::read_to_string("/proc/thread-self/schedstat").expect("Linux, with /proc mounted");
+        statistics.split(' ').next().and_then(|first| first.parse().ok()).expect("a number comes first")
+    }
+}
+
+impl Measurement for ThreadTime {
+    type Intermediate = u64;
+    type Value = Duration;
+
+    fn start(&self) -> u64 {
+        Self::nanoseconds()
+    }
+    fn end(&self, start: u64) -> Duration {
+        Duration::from_nanos(Self::nanoseconds() - start)
+    }
+    fn add(&self, a: &Duration, b: &Duration) -> Duration {
+        *a + *b
+    }
+    fn zero(&self) -> Duration {
+        Duration::ZERO
+    }
+    fn to_f64(&self, value: &Duration) -> f64 {
+        value.as_nanos() as f64
+    }
+    fn formatter(&self) -> &dyn ValueFormatter {
+        self.0.formatter()
+    }
+}
+
+/// Numbers that look random (`SplitMix64`).
 struct Random(u64);
 
 impl Random {
@@ -73,7 +111,8 @@ impl Mesh {
     }
 
     fn cuboid() -> Self {
-        let positions = (0..8).map(|i| Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32)).collect();
+        let positions =
+            (0..8).map(|i| Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32)).collect();
         let faces = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]];
         let triangles = faces.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]).collect();
         Self { positions, triangles }
@@ -112,7 +151,8 @@ impl Scene {
     }
 
     fn primary(&self) -> Vec<Ray> {
-        let frame = Frame::with_tangent((self.eye - self.target).normalize(), Vec3::Y.cross(self.eye - self.target));
+        let frame =
+            Frame::with_tangent((self.eye - self.target).normalize(), Vec3::Y.cross(self.eye - self.target));
         let mut random = Random(1);
         let mut at = |i: usize| (i as f32 + random.uniform()) / FRAME as f32 * 2.0 - 1.0;
         (0..FRAME * FRAME)
@@ -150,10 +190,12 @@ fn interior() -> Scene {
     mesh.add(&cuboid, put(Vec3::new(8.0, 3.0, 6.0), 0.0, Vec3::ZERO));
     let mut random = Random(2);
     for _ in 0..14 {
-        let (turn, at) = (random.uniform() * TAU, Vec3::new(0.5 + random.uniform() * 6.5, 0.0, random.uniform() * 5.0));
+        let (turn, at) =
+            (random.uniform() * TAU, Vec3::new(0.5 + random.uniform() * 6.5, 0.0, random.uniform() * 5.0));
         mesh.add(&cuboid, put(Vec3::new(0.9, 0.04, 0.6), turn, at + Vec3::Y * 0.7));
         for leg in 0..4 {
-            let corner = Quat::from_rotation_y(turn) * Vec3::new((leg & 1) as f32 * 0.85, 0.0, (leg >> 1) as f32 * 0.55);
+            let corner = Quat::from_rotation_y(turn)
+                * Vec3::new((leg & 1) as f32 * 0.85, 0.0, (leg >> 1) as f32 * 0.55);
             mesh.add(&cuboid, put(Vec3::new(0.05, 0.7, 0.05), turn, at + corner));
         }
         let top = at + Quat::from_rotation_y(turn) * Vec3::new(0.45, 0.74, 0.3);
@@ -161,7 +203,8 @@ fn interior() -> Scene {
         mesh.add(&sphere, put(Vec3::splat(size), turn, top + Vec3::new(0.1, size, 0.0)));
         mesh.add(&torus, put(Vec3::splat(0.12), turn, top + Vec3::new(-0.15, 0.05, 0.1)));
     }
-    let curtain = Mesh::sheet(120, 40, |u, v| Vec3::new(0.1 + 0.05 * libm::sinf(u * 60.0), v * 2.6, 0.5 + u * 5.0));
+    let curtain =
+        Mesh::sheet(120, 40, |u, v| Vec3::new(0.1 + 0.05 * libm::sinf(u * 60.0), v * 2.6, 0.5 + u * 5.0));
     mesh.add(&curtain, Affine3A::IDENTITY);
     let light = [Vec3::new(3.0, 2.9, 2.0), Vec3::X * 2.0, Vec3::Z * 2.0];
     let view = [Vec3::new(7.7, 1.7, 5.7), Vec3::new(2.0, 0.7, 1.5)];
@@ -187,8 +230,10 @@ fn instanced() -> Scene {
     let mut placements = vec![Placement { mesh: 0, to_world: Affine3A::IDENTITY }];
     let mut random = Random(3);
     for i in 0..2000 {
-        let turn = Quat::from_euler(EulerRot::XYZ, random.uniform() * 6.0, random.uniform() * 6.0, random.uniform());
-        let at = Vec3::new(random.uniform() * 50.0 - 25.0, random.uniform() * 3.0, random.uniform() * 50.0 - 25.0);
+        let turn =
+            Quat::from_euler(EulerRot::XYZ, random.uniform() * 6.0, random.uniform() * 6.0, random.uniform());
+        let at =
+            Vec3::new(random.uniform() * 50.0 - 25.0, random.uniform() * 3.0, random.uniform() * 50.0 - 25.0);
         let scale = Vec3::splat(0.2 + random.uniform() * 0.6);
         let to_world = Affine3A::from_scale_rotation_translation(scale, turn, at);
         placements.push(Placement { mesh: 1 + i % 3, to_world });
@@ -198,19 +243,27 @@ fn instanced() -> Scene {
     Scene::new("instanced", meshes, placements, view, light)
 }
 
-fn rays(criterion: &mut Criterion) {
+fn rays(criterion: &mut Criterion<ThreadTime>) {
     for scene in [interior(), terrain(), instanced()] {
         let mut group = criterion.benchmark_group(scene.name);
-        group.sample_size(10).warm_up_time(Duration::from_millis(300)).measurement_time(Duration::from_secs(2));
+        group
+            .sample_size(10)
+            .warm_up_time(Duration::from_millis(300))
+            .measurement_time(Duration::from_secs(2));
         let primary = scene.primary();
         let points = scene.points(&primary);
         let mut random = Random(4);
-        let bounce: Vec<_> =
-            points.iter().map(|p| random.cosine(p.normal)).zip(&points).map(|(d, p)| Ray::new(p.leave(d), d)).collect();
+        let bounce: Vec<_> = points
+            .iter()
+            .map(|p| random.cosine(p.normal))
+            .zip(&points)
+            .map(|(d, p)| Ray::new(p.leave(d), d))
+            .collect();
         let shadow: Vec<_> = points
             .iter()
             .map(|p| {
-                let on_light = scene.light[0] + scene.light[1] * random.uniform() + scene.light[2] * random.uniform();
+                let on_light =
+                    scene.light[0] + scene.light[1] * random.uniform() + scene.light[2] * random.uniform();
                 let origin = p.leave(on_light - p.position);
                 Ray { origin, direction: on_light - origin, t_max: 1.0 }
             })
@@ -218,7 +271,9 @@ fn rays(criterion: &mut Criterion) {
         for (name, rays) in [("primary", &primary), ("bounce", &bounce)] {
             group.throughput(Throughput::Elements(rays.len() as u64));
             group.bench_function(name, |b| {
-                b.iter(|| rays.iter().filter(|r| scene.placed.closest(black_box(r), |_| true).is_some()).count());
+                b.iter(|| {
+                    rays.iter().filter(|r| scene.placed.closest(black_box(r), |_| true).is_some()).count()
+                });
             });
         }
         for (name, rays) in [("shadow", &shadow), ("any-hit bounce", &bounce)] {
@@ -231,8 +286,9 @@ fn rays(criterion: &mut Criterion) {
     }
 }
 
-fn build(criterion: &mut Criterion) {
-    let mesh = Mesh::sheet(708, 708, |u, v| Vec3::new(u, libm::sinf(u * 40.0) * libm::cosf(v * 30.0) * 0.1, v));
+fn build(criterion: &mut Criterion<ThreadTime>) {
+    let mesh =
+        Mesh::sheet(708, 708, |u, v| Vec3::new(u, libm::sinf(u * 40.0) * libm::cosf(v * 30.0) * 0.1, v));
     let mut group = criterion.benchmark_group("build");
     group.sample_size(10).warm_up_time(Duration::from_millis(1)).measurement_time(Duration::from_secs(1));
     group.throughput(Throughput::Elements(mesh.triangles.len() as u64));
@@ -242,5 +298,9 @@ fn build(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, rays, build);
+criterion_group! {
+    name = benches;
+    config = Criterion::default().with_measurement(ThreadTime(WallTime)).without_plots();
+    targets = rays, build
+}
 criterion_main!(benches);

@@ -130,7 +130,8 @@ mod tests {
         }
         assert_eq!((book.fetches, book.given_back.len()), (1, 0));
         assert!(book.exchanges.last().is_some_and(|last| last.leaving && last.holding.is_empty()));
-        let asks = |exchange: &Exchange| exchange.leaving || exchange.wants as usize + exchange.holding.len() >= 2;
+        let asks =
+            |exchange: &Exchange| exchange.leaving || exchange.wants as usize + exchange.holding.len() >= 2;
         assert!(book.exchanges.iter().all(asks), "the pool never idles");
     }
 
@@ -150,7 +151,8 @@ mod tests {
         ends(worker).await;
         let book = farm.book();
         assert!(book.brought.is_empty());
-        let mut given: Vec<_> = book.given_back.iter().map(|(id, failure)| (id.as_str(), failure.kind)).collect();
+        let mut given: Vec<_> =
+            book.given_back.iter().map(|(id, failure)| (id.as_str(), failure.kind)).collect();
         given.sort_by_key(|(id, _)| *id);
         assert_eq!(given, [("lease-1", FailureKind::HandedBack), ("lease-2", FailureKind::HandedBack)]);
     }

@@ -104,11 +104,12 @@ impl Aggregate {
 
     #[inline(always)]
     fn visit<L: Lanes, O: Ordering>(&self, ray: &Ray, visitor: &mut impl Visitor) -> ControlFlow<()> {
-        // Written so that NaN is refused too.
-        if !(ray.t_max > 0.0) {
+        if ray.t_max.is_nan() || ray.t_max <= 0.0 {
             return ControlFlow::Continue(());
         }
-        let Some(prepared) = Prepared::new(ray.origin, ray.direction) else { return ControlFlow::Continue(()) };
+        let Some(prepared) = Prepared::new(ray.origin, ray.direction) else {
+            return ControlFlow::Continue(());
+        };
         if let Some(only) = self.only {
             return self.visit_mesh::<L, O>(only, &prepared, visitor);
         }
@@ -157,7 +158,7 @@ impl Aggregate {
 
 /// What is done with the hits of one ray.
 trait Visitor {
-    /// Hits farther than this do not matter any more; finite.
+    /// Hits farther than this do not matter any more.
     fn limit(&self) -> f32;
     /// Takes a hit with 0 < t ≤ `limit`; breaks where no other matters.
     fn hit(&mut self, hit: Hit) -> ControlFlow<()>;
@@ -173,7 +174,7 @@ struct Best<A> {
 impl<A: Fn(&Hit) -> bool> Visitor for Best<A> {
     #[inline(always)]
     fn limit(&self) -> f32 {
-        self.hit.t.min(f32::MAX)
+        self.hit.t
     }
 
     #[inline(always)]
@@ -195,12 +196,16 @@ struct Any<A> {
 impl<A: Fn(&Hit) -> bool> Visitor for Any<A> {
     #[inline(always)]
     fn limit(&self) -> f32 {
-        self.t_max.min(f32::MAX)
+        self.t_max
     }
 
     #[inline(always)]
     fn hit(&mut self, hit: Hit) -> ControlFlow<()> {
-        if hit.t < self.t_max && (self.accept)(&hit) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        if hit.t < self.t_max && (self.accept)(&hit) {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
     }
 }
 
@@ -214,7 +219,7 @@ struct Product<P> {
 impl<P: Fn(&Hit) -> f32> Visitor for Product<P> {
     #[inline(always)]
     fn limit(&self) -> f32 {
-        self.t_max.min(f32::MAX)
+        self.t_max
     }
 
     #[inline(always)]

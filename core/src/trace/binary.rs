@@ -39,7 +39,9 @@ impl Effort {
             0..200_000 => {
                 Self { search: PlocSearchDistance::High, precision: SortPrecision::U128, reinsertion: 0.3 }
             }
-            _ => Self { search: PlocSearchDistance::Medium, precision: SortPrecision::U64, reinsertion: 0.05 },
+            _ => {
+                Self { search: PlocSearchDistance::Medium, precision: SortPrecision::U64, reinsertion: 0.05 }
+            }
         }
     }
 }
@@ -132,7 +134,13 @@ impl Binary {
 
 fn longest_axis(bounds: Bounds) -> usize {
     let size = bounds.size();
-    if size.x >= size.y && size.x >= size.z { 0 } else if size.y >= size.z { 1 } else { 2 }
+    if size.x >= size.y && size.x >= size.z {
+        0
+    } else if size.y >= size.z {
+        1
+    } else {
+        2
+    }
 }
 
 /// The boxes for obvhs: scaled by a power of two to coordinates below 2, so that areas stay in range and the tree does
@@ -154,7 +162,7 @@ fn roughened(boxes: &[Bounds]) -> Vec<Aabb> {
         .collect()
 }
 
-/// A number in 0..1 that looks random (finaliser of MurmurHash3).
+/// A number in 0..1 that looks random (the finaliser of `MurmurHash3`).
 fn scrambled(index: u32) -> f32 {
     let mut h = index.wrapping_add(0x9e37_79b9);
     h = (h ^ (h >> 16)).wrapping_mul(0x85eb_ca6b);

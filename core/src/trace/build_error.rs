@@ -43,7 +43,9 @@ pub enum BuildError {
         meshes: usize,
     },
     /// A transform is not finite, cannot be inverted, or moves its mesh too far out.
-    #[error("the transform of placement {placement} is not invertible or leaves 2^60: transform the mesh's vertices instead, or remove it")]
+    #[error(
+        "the transform of placement {placement} is not invertible or leaves 2^60: transform the mesh's vertices instead, or remove it"
+    )]
     Transform {
         /// The placement.
         placement: usize,

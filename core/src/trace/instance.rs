@@ -70,7 +70,7 @@ impl Moved {
         }
         let linear = rows(matrix);
         let inverse = rows(matrix.inverse());
-        if !inverse.iter().all(|row| row.is_finite()) || inverse.iter().any(|row| *row == Vec3::ZERO) {
+        if !inverse.iter().all(|row| row.is_finite()) || inverse.contains(&Vec3::ZERO) {
             return None;
         }
         let columns = [0, 1, 2].map(|c| Vec3::from_array([0, 1, 2].map(|r: usize| inverse[r][c].abs())));
@@ -119,7 +119,8 @@ impl Moved {
             let (a, b) = (row * mesh.min.as_dvec3(), row * mesh.max.as_dvec3());
             let shift = f64::from(self.translation[axis]);
             // Rays go into the mesh's space by the rounded inverse, at some units of these magnitudes.
-            let magnitude = f64::from(self.round_trip[axis].dot(Vec3::ONE)) * a.abs().max(b.abs()).element_sum();
+            let magnitude =
+                f64::from(self.round_trip[axis].dot(Vec3::ONE)) * a.abs().max(b.abs()).element_sum();
             let rounding = (magnitude + shift.abs()) * (1.0 / (1 << 22) as f64);
             min[axis] = (a.min(b).element_sum() + shift - rounding) as f32;
             max[axis] = (a.max(b).element_sum() + shift + rounding) as f32;

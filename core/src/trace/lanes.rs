@@ -111,13 +111,16 @@ pub(super) mod portable {
 }
 
 #[cfg(all(target_arch = "x86_64", target_feature = "avx2", target_feature = "fma"))]
-#[expect(unsafe_code, reason = "Rust has no safe way yet to call these instructions where the whole build has them")]
+#[expect(
+    unsafe_code,
+    reason = "Rust has no safe way yet to call these instructions where the whole build has them"
+)]
 mod avx2 {
     use super::{Lanes, Row, WIDTH};
     use std::arch::x86_64::{
-        __m256, _CMP_LE_OQ, _CMP_LT_OQ, _mm256_add_ps, _mm256_andnot_ps, _mm256_cmp_ps, _mm256_div_ps, _mm256_fmadd_ps,
-        _mm256_fmsub_ps, _mm256_fnmadd_ps, _mm256_load_ps, _mm256_max_ps, _mm256_min_ps, _mm256_movemask_ps,
-        _mm256_mul_ps, _mm256_set1_ps, _mm256_store_ps, _mm256_sub_ps,
+        __m256, _CMP_LE_OQ, _CMP_LT_OQ, _mm256_add_ps, _mm256_andnot_ps, _mm256_cmp_ps, _mm256_div_ps,
+        _mm256_fmadd_ps, _mm256_fmsub_ps, _mm256_fnmadd_ps, _mm256_load_ps, _mm256_max_ps, _mm256_min_ps,
+        _mm256_movemask_ps, _mm256_mul_ps, _mm256_set1_ps, _mm256_store_ps, _mm256_sub_ps,
     };
 
     /// One AVX register.
@@ -205,8 +208,20 @@ mod tests {
     use super::portable::Portable;
     use super::*;
 
-    const AWKWARD: [f32; 12] =
-        [0.0, -0.0, 1.0, -1.0, 1.0 / 3.0, 1e-40, -1e-40, 3e38, -3e38, f32::INFINITY, f32::NEG_INFINITY, f32::NAN];
+    const AWKWARD: [f32; 12] = [
+        0.0,
+        -0.0,
+        1.0,
+        -1.0,
+        1.0 / 3.0,
+        1e-40,
+        -1e-40,
+        3e38,
+        -3e38,
+        f32::INFINITY,
+        f32::NEG_INFINITY,
+        f32::NAN,
+    ];
 
     fn bits<L: Lanes>(lanes: L) -> [u32; WIDTH] {
         // Which NaN an operation gives is not fixed; that it gives one is.
@@ -216,7 +231,13 @@ mod tests {
     fn results<L: Lanes>(a: f32, b: f32, c: f32) -> Vec<[u32; WIDTH]> {
         let (a, b, c) = (L::splat(a), L::load(&Row([b; WIDTH])), L::splat(c));
         let mut all = vec![bits(a.add(b)), bits(a.sub(b)), bits(a.mul(b)), bits(a.div(b)), bits(a.min(b))];
-        all.extend([bits(a.max(b)), bits(a.mul_add(b, c)), bits(a.mul_sub(b, c)), bits(a.neg_mul_add(b, c)), bits(a.abs())]);
+        all.extend([
+            bits(a.max(b)),
+            bits(a.mul_add(b, c)),
+            bits(a.mul_sub(b, c)),
+            bits(a.neg_mul_add(b, c)),
+            bits(a.abs()),
+        ]);
         all.push([a.at_most(b); WIDTH]);
         all.push([a.below(b); WIDTH]);
         all

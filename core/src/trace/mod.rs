@@ -4,6 +4,7 @@ pub mod aggregate;
 mod binary;
 pub mod bounds;
 #[cfg(test)]
+#[expect(clippy::float_cmp, reason = "the same hit means the same bits")]
 mod brute_force;
 pub mod build_error;
 mod collapse;

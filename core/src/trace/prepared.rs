@@ -2,14 +2,15 @@
 
 use glam::Vec3;
 
-/// Origins farther from zero than this on any axis hit nothing: products with `inverse` would leave the range of f32.
+/// Origins whose coordinates add up to more than this hit nothing: products with `inverse` would leave the range of f32.
 const FARTHEST_ORIGIN: f32 = (1u64 << 62) as f32;
 
 /// Components of a direction smaller than this beside a largest one in 1..2 count as this when boxes are tested: across a
 /// scene such a ray moves by less than the padding of any box that matters, and no box meets 0 · ∞.
 const LEAST_SLOPE: f32 = 1.0 / (1u64 << 63) as f32;
 
-/// A ray whose direction was scaled by a power of two so that its largest component is in 1..2. That changes no bit of
+/// A ray whose direction was scaled by a power of two so that its largest component is in 1..2, as far as floats
+/// reach. That changes no bit of
 /// the result and keeps all that follows in range.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Prepared {
@@ -26,82 +27,77 @@ pub(super) struct Prepared {
     pub(super) axes: [usize; 3],
     /// Shear of x and y, and scale of z.
     pub(super) shear: [f32; 3],
-    /// `t` in units of the direction given is `t` here times this power of two.
-    pub(super) scale: f64,
+    /// `t` in units of the direction given is `t` here times this power of two,
+    pub(super) outward: f32,
+    /// and this is its inverse.
+    pub(super) inward: f32,
 }
 
 impl Prepared {
     /// `None` where the ray cannot hit anything (see [`super::ray::Ray`]).
-    #[inline]
+    #[inline(always)]
     pub(super) fn new(origin: Vec3, direction: Vec3) -> Option<Self> {
-        let longest = direction.abs().max_element();
-        // NaN fails both comparisons, in whatever component: `max_element` may drop it, the sum does not.
-        let sum = origin.abs().element_sum() + direction.abs().element_sum();
-        if !(longest > 0.0 && longest.is_finite() && origin.abs().max_element() <= FARTHEST_ORIGIN) || sum.is_nan() {
+        let longest = direction.x.abs().max(direction.y.abs()).max(direction.z.abs());
+        // The exponents of the smallest and largest normal floats bring any other direction close to 1..2.
+        let exponent = (longest.to_bits() >> 23).clamp(1, 253);
+        let (outward, inward) = (f32::from_bits((254 - exponent) << 23), f32::from_bits(exponent << 23));
+        let (x, y, z) = (direction.x * outward, direction.y * outward, direction.z * outward);
+        // One sum finds every NaN and infinity.
+        let sum = x.abs() + y.abs() + z.abs() + origin.x.abs() + origin.y.abs() + origin.z.abs();
+        if !(sum <= FARTHEST_ORIGIN && longest > 0.0) {
             return None;
         }
-        let (direction, scale) = unit_exponent(direction, longest);
-        let d = direction.to_array();
-        let z = if direction.x.abs() >= direction.y.abs() && direction.x.abs() >= direction.z.abs() {
-            0
-        } else if direction.y.abs() >= direction.z.abs() {
-            1
+        let inverse = [inverse(x), inverse(y), inverse(z)];
+        let longest = longest * outward;
+        let axes = if x.abs() >= longest {
+            [1, 2, 0]
+        } else if y.abs() >= longest {
+            [2, 0, 1]
         } else {
-            2
+            [0, 1, 2]
         };
-        let axes = [[1, 2, 0], [2, 0, 1], [0, 1, 2]][z];
-        let steep = d.map(|c| if c.abs() < LEAST_SLOPE { LEAST_SLOPE.copysign(c) } else { c });
-        let inverse = steep.map(|c| 1.0 / c);
-        let o = origin.to_array();
+        let (origin, direction) = ([origin.x, origin.y, origin.z], [x, y, z]);
+        let depth = inverse[axes[2]];
         Some(Self {
-            origin: o,
-            direction: d,
+            origin,
+            direction,
             inverse,
-            offset: [o[0] * inverse[0], o[1] * inverse[1], o[2] * inverse[2]],
-            nearer: d.map(|c| usize::from(c.is_sign_negative())),
+            offset: [origin[0] * inverse[0], origin[1] * inverse[1], origin[2] * inverse[2]],
+            nearer: [sign(x), sign(y), sign(z)],
             axes,
-            shear: [d[axes[0]] / d[z], d[axes[1]] / d[z], 1.0 / d[z]],
-            scale,
+            shear: [direction[axes[0]] * depth, direction[axes[1]] * depth, depth],
+            outward,
+            inward,
         })
     }
 
     /// A limit on `t` in the caller's units, in the units used here.
     #[inline]
     pub(super) fn inward(&self, t: f32) -> f32 {
-        if self.scale == 1.0 { t } else { (f64::from(t) / self.scale) as f32 }
+        t * self.inward
     }
 
     /// A `t` found here in the caller's units.
     #[inline]
     pub(super) fn outward(&self, t: f32) -> f32 {
-        if self.scale == 1.0 { t } else { (f64::from(t) * self.scale) as f32 }
+        t * self.outward
     }
 }
 
-/// The direction times a power of two that brings its longest component into 1..2, and that power.
-#[inline]
-fn unit_exponent(direction: Vec3, longest: f32) -> (Vec3, f64) {
-    let exponent = longest.to_bits() >> 23;
-    if exponent == 127 {
-        return (direction, 1.0);
-    }
-    if (1..=253).contains(&exponent) {
-        let power = f32::from_bits((254 - exponent) << 23);
-        return (direction * power, f64::from(power));
-    }
-    extreme_exponent(direction)
+/// 1 / component, finite.
+#[inline(always)]
+fn inverse(component: f32) -> f32 {
+    let steep = if component.abs() < LEAST_SLOPE { LEAST_SLOPE.copysign(component) } else { component };
+    1.0 / steep
 }
 
-/// [`unit_exponent`] for denormal directions and those of 2¹²⁷ and more.
-#[cold]
-fn extreme_exponent(direction: Vec3) -> (Vec3, f64) {
-    let shift = if direction.abs().max_element() < 1.0 { (1u128 << 100) as f32 } else { 0.25 };
-    let shifted = direction * shift;
-    let power = f32::from_bits((254 - (shifted.abs().max_element().to_bits() >> 23)) << 23);
-    (shifted * power, f64::from(shift) * f64::from(power))
+#[inline(always)]
+fn sign(component: f32) -> usize {
+    (component.to_bits() >> 31) as usize
 }
 
 #[cfg(test)]
+#[expect(clippy::float_cmp, reason = "these values are exact")]
 mod tests {
     use super::*;
 
@@ -110,8 +106,9 @@ mod tests {
         for exponent in [-149, -140, -126, -100, -1, 0, 1, 50, 126, 127] {
             let length = 2.0_f64.powi(exponent) as f32;
             let ray = Prepared::new(Vec3::ZERO, Vec3::new(0.0, -length, 0.0)).unwrap();
-            assert_eq!(ray.shear, [0.0, 0.0, -1.0], "2^{exponent}");
-            assert_eq!(ray.scale, 2.0_f64.powi(-exponent));
+            let rest = 2.0_f32.powi((exponent + 126).min(0) + (exponent - 126).max(0));
+            assert_eq!(ray.direction, [0.0, -rest, 0.0], "2^{exponent}");
+            assert_eq!((ray.outward * length, ray.outward * ray.inward), (rest, 1.0));
             assert_eq!(ray.axes[2], 1);
         }
     }

@@ -1,11 +1,12 @@
 //! A ray and what it hits.
 
 use glam::{Vec2, Vec3};
+use std::cmp::Ordering;
 
 /// The points `origin + t · direction` with 0 < t < `t_max`.
 ///
-/// A ray hits nothing where its origin is not finite or farther than 2⁶² from zero on an axis, where its
-/// direction is zero or not finite, or where `t_max` is NaN or not positive.
+/// A ray hits nothing where its origin is not finite or its coordinates add up to more than 2⁶², where its direction is
+/// zero or not finite, or where `t_max` is NaN or not positive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
     /// Where the ray starts, in world space.
@@ -42,7 +43,10 @@ impl Hit {
     /// which they are found.
     #[inline]
     pub(super) fn precedes(&self, other: &Hit) -> bool {
-        self.t < other.t
-            || (self.t == other.t && (self.instance, self.triangle) < (other.instance, other.triangle))
+        match self.t.partial_cmp(&other.t) {
+            Some(Ordering::Less) => true,
+            Some(Ordering::Equal) => (self.instance, self.triangle) < (other.instance, other.triangle),
+            _ => false,
+        }
     }
 }

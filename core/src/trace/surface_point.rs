@@ -26,7 +26,7 @@ impl SurfacePoint {
         let [a, b, c] = [0, 1, 2].map(|i: usize| vertices[i] * weights[i]);
         let position = a + b + c;
         let error = gamma(7.0) * (a.abs() + b.abs() + c.abs());
-        let edges = short_edges(vertices.map(|v| v.as_dvec3()));
+        let edges = short_edges(vertices.map(Vec3::as_dvec3));
         match &instance.moved {
             None => Self { position, error, normal: unit(edges[0].cross(edges[1]), edges[0]) },
             Some(moved) => {

@@ -89,7 +89,14 @@ impl Block {
         let volume = reach(ax, bx, cx).mul(reach(ay, by, cy)).mul(reach(az, bz, cz));
         let unsure = mask & t.abs().at_most(volume.mul(reciprocal.abs()).mul(L::splat(UNSURE)));
         if unsure != 0 {
-            t = L::load(&self.settle_distances(unsure, ray, t.store()));
+            let mut row = t.store();
+            let mut rest = unsure;
+            while rest != 0 {
+                let lane = rest.trailing_zeros() as usize & 7;
+                rest &= rest - 1;
+                row.0[lane] = self.exact_distance(lane, ray);
+            }
+            t = L::load(&row);
         }
         mask &= zero.below(t) & t.at_most(L::splat(limit));
         if mask == 0 {
@@ -98,25 +105,32 @@ impl Block {
         Some(Found { mask, t: t.store(), second: second.store(), third: third.store() })
     }
 
-    /// Computes `t` of the lanes in `mask` again in f64, from the triangle's plane.
-    #[cold]
-    fn settle_distances(&self, mask: u32, ray: &Prepared, mut t: Row) -> Row {
-        let origin = DVec3::from_array(ray.origin.map(f64::from));
-        for lane in (0..WIDTH).filter(|lane| mask & (1 << lane) != 0) {
-            let vertex = |v: usize| {
-                DVec3::from_array([0, 1, 2].map(|axis: usize| f64::from(self.vertices[v][axis].0[lane])))
-            };
-            let normal = (vertex(1) - vertex(0)).cross(vertex(2) - vertex(0));
-            let nearest = [vertex(0), vertex(1), vertex(2)]
-                .map(|v| v - origin)
-                .into_iter()
-                .reduce(|a, b| if b.length_squared() < a.length_squared() { b } else { a })
-                .expect("three vertices");
-            let distance = normal.dot(nearest) / normal.dot(ray.direction.map(f64::from).into());
-            t.0[lane] = distance as f32;
-        }
-        t
+    /// `t` from the triangle's plane, in f64. Every ray that leaves a surface comes here once or twice, so it is
+    /// written for speed.
+    #[inline(never)]
+    fn exact_distance(&self, lane: usize, ray: &Prepared) -> f32 {
+        let lane = lane & 7;
+        let origin = double(ray.origin[0], ray.origin[1], ray.origin[2]);
+        let vertex = |v: &[Row; 3]| double(v[0].0[lane], v[1].0[lane], v[2].0[lane]) - origin;
+        let (a, b, c) = (vertex(&self.vertices[0]), vertex(&self.vertices[1]), vertex(&self.vertices[2]));
+        let normal = (b - a).cross(c - a);
+        // The nearest vertex loses least to cancellation.
+        let (aa, bb, cc) = (a.length_squared(), b.length_squared(), c.length_squared());
+        let nearest = if aa <= bb && aa <= cc {
+            a
+        } else if bb <= cc {
+            b
+        } else {
+            c
+        };
+        let direction = double(ray.direction[0], ray.direction[1], ray.direction[2]);
+        (normal.dot(nearest) / normal.dot(direction)) as f32
     }
+}
+
+#[inline(always)]
+fn double(x: f32, y: f32, z: f32) -> DVec3 {
+    DVec3::new(f64::from(x), f64::from(y), f64::from(z))
 }
 
 /// Bound on the error of `t`, in products of the largest sheared coordinates over the sum of the edge functions: each
@@ -143,6 +157,7 @@ fn settle_zeros(mask: u32, xy: &[Row; 6], edges: &mut [Row; 3]) -> u32 {
 }
 
 #[cfg(test)]
+#[expect(clippy::float_cmp, reason = "these values are exact")]
 mod tests {
     use super::super::lanes::{Native, portable::Portable};
     use super::*;

@@ -50,7 +50,8 @@ pub(super) fn walk<L: Lanes, O: Ordering>(
 ) -> ControlFlow<()> {
     let Some(mut current) = tree.root else { return ControlFlow::Continue(()) };
     let slabs = Slabs::<L>::new(ray);
-    let mut stack = Stack::new();
+    let mut slots = [MaybeUninit::uninit(); STACK];
+    let mut stack = Stack { slots: &mut slots, len: 0 };
     loop {
         let next = if current.is_leaf() {
             limit = leaf(current.index(), limit)?;
@@ -102,18 +103,14 @@ impl<L: Lanes> Slabs<L> {
 
 /// Children still to visit, each with the distance at which the ray enters it in the upper half of a word. Distances
 /// are not negative, so words compare as distances do, and then as children.
-struct Stack {
-    slots: [MaybeUninit<u64>; STACK],
+struct Stack<'a> {
+    /// Lent, so that `len` can be kept in a register and nothing is filled in advance.
+    slots: &'a mut [MaybeUninit<u64>; STACK],
     /// Slots below this are written.
     len: usize,
 }
 
-impl Stack {
-    #[inline(always)]
-    fn new() -> Self {
-        Self { slots: [MaybeUninit::uninit(); STACK], len: 0 }
-    }
-
+impl Stack<'_> {
     #[inline(always)]
     fn push(&mut self, word: u64) {
         // The index is checked: a tree too deep for the stack would panic, not go astray.

@@ -52,15 +52,13 @@ impl Check {
 }
 
 fn document(contents: &Contents) -> Document<'_> {
-    let warning = |w| {
-        let ovtigre_core::gltf::error::Problem { pointer, detail } = w;
-        Warning { pointer, detail }
-    };
     Document {
         contents: &contents.report,
         needs: &contents.needs,
         leaves_out: &contents.leaves_out,
-        warnings: contents.warnings.iter().map(warning).collect(),
+        warnings: (contents.warnings.iter())
+            .map(|w| Warning { pointer: &w.pointer, detail: &w.detail })
+            .collect(),
     }
 }
 

@@ -177,10 +177,12 @@ impl Watched {
 
     /// Waits for its end.
     async fn outlive(&self, child: &mut Child) -> Ending {
+        // Waiting would close it, and closing it tells the worker to leave.
+        let stdin = child.stdin.take();
         let ended = tokio::select! {
             ended = child.wait() => ended,
             () = self.stop.cancelled() => {
-                drop(child.stdin.take());
+                drop(stdin);
                 if tokio::time::timeout(FAREWELL, child.wait()).await.is_err() {
                     child.kill().await.ok();
                 }

@@ -37,9 +37,9 @@ impl Output {
         Ok(output)
     }
 
-    /// Fetches the picture so far.
-    pub(crate) async fn fetch(&self, client: &Client, job: &JobId) -> Outcome {
-        save(client.image(job, None, None).await?, &self.exr).await?;
+    /// Writes a job's picture, whose EXR is under way, and fetches a developed one where that is asked for.
+    pub(crate) async fn write(&self, exr: Answer, client: &Client, job: &JobId) -> Outcome {
+        save(exr, &self.exr).await?;
         if let Some(png) = &self.png {
             save(client.developed(job, &Development::default()).await?, png).await?;
         }

@@ -31,8 +31,10 @@ pub(crate) fn bytes(path: &Path) -> Outcome<Vec<u8>> {
 /// What a fault of a scene is called: the file, and what the reader says.
 pub(crate) fn fault(path: &Path, fault: &impl ToString) -> CommandError {
     let fault = fault.to_string();
-    let fault = fault.strip_prefix("scene: ").unwrap_or(&fault);
-    CommandError::wrong(format!("{}: {fault}", path.display()))
+    match fault.strip_prefix("scene:") {
+        Some(rest) => CommandError::wrong(format!("{}:{rest}", path.display())),
+        None => CommandError::wrong(format!("{}: {fault}", path.display())),
+    }
 }
 
 #[derive(Debug)]
@@ -178,7 +180,8 @@ mod tests {
     fn a_binary_scene_with_files_beside_it_is_packed_and_one_without_is_sent_as_it_is() {
         let folder = folder(SCENE);
         for (json, packed) in [(SCENE, true), (r#"{"asset":{"version":"2.0"}}"#, false)] {
-            let padded = format!("{json:1$}", json.len().next_multiple_of(4));
+            let length = json.len().next_multiple_of(4);
+            let padded = format!("{json:length$}");
             let mut glb = b"glTF\x02\0\0\0".to_vec();
             glb.extend((padded.len() as u32 + 20).to_le_bytes());
             glb.extend((padded.len() as u32).to_le_bytes());
