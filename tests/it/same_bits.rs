@@ -122,3 +122,9 @@ fn scaling_and_moving_change_the_picture_no_more_than_its_error() {
         assert_eq!(other.invalid(), 0);
     }
 }
+
+#[test]
+fn the_scene_that_comes_along_is_the_one_its_code_makes() {
+    let file = std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/room.glb")).unwrap();
+    assert!(file == ovtigre_tests::room::room(), "run: cargo run -p ovtigre-tests --bin make-scenes");
+}

@@ -2,4 +2,5 @@
 
 pub mod glb;
 pub mod picture;
+pub mod room;
 pub mod scenes;
