@@ -1,5 +1,7 @@
 //! The program `ovtigre`, as its users run it.
 
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on ends")]
+
 use ovtigre_core::film::exr::{Layers, read_layers};
 use serde_json::{Value, json};
 use std::{

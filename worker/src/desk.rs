@@ -195,7 +195,7 @@ mod tests {
     fn durations_from_outside_are_harmless() {
         for seconds in [f64::NAN, f64::INFINITY, -1.0, 0.0, 1e300] {
             let taken = duration(seconds);
-            assert!(taken >= Duration::from_millis(10) && taken <= Duration::from_secs(86_400));
+            assert!(taken >= Duration::from_millis(10) && taken <= Duration::from_hours(24));
         }
     }
 }

@@ -26,7 +26,7 @@ use std::{
 use tokio::task::JoinSet;
 
 /// Time for the last sums of a worker that leaves; a farm may be lost for good.
-const FAREWELL: Duration = Duration::from_secs(60);
+const FAREWELL: Duration = Duration::from_mins(1);
 
 /// A batch that brought no sum.
 struct Failed {

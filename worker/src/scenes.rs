@@ -93,7 +93,7 @@ impl SceneFolder {
                     break;
                 }
                 Err(error) if error.may_pass() && left > 0 => {
-                    tracing::warn!(%error, "fetching a scene again")
+                    tracing::warn!(%error, "fetching a scene again");
                 }
                 Err(error) => return Err(SceneError::Fetch { id: id.clone(), error }),
             }

@@ -13,7 +13,7 @@ use std::time::Duration;
 /// Longest document that is read.
 const DOCUMENT_MAX: usize = 64 << 20;
 /// Longest pause between two pieces of an answer.
-pub(super) const PAUSE_MAX: Duration = Duration::from_secs(60);
+pub(super) const PAUSE_MAX: Duration = Duration::from_mins(1);
 
 /// A success whose body is not read yet.
 #[derive(Debug)]

@@ -23,7 +23,7 @@ pub(super) const FIRST_WAIT: Duration = Duration::from_millis(100);
 /// The longest wait between two tries.
 pub(super) const LONGEST_WAIT: Duration = Duration::from_secs(5);
 /// A farm that says "later than this" is not waited for.
-const RETRY_AFTER_MAX: Duration = Duration::from_secs(60);
+const RETRY_AFTER_MAX: Duration = Duration::from_mins(1);
 
 /// A client of one farm; cheap to clone.
 #[derive(Clone, Debug)]

@@ -50,7 +50,7 @@ impl Client {
     pub fn jobs(&self, state: Option<JobState>) -> Pages<JobStatus> {
         let mut call = Call::new(Method::GET, route::JOBS);
         if let Some(state) = state {
-            call = call.query("state", state.name());
+            call = call.query("state", &state.name());
         }
         Pages::new(self.clone(), call)
     }
@@ -79,28 +79,28 @@ impl Client {
         known: Option<&str>,
         wait: Option<Duration>,
     ) -> Result<Answer, ClientError> {
-        let mut call = Call::new(Method::GET, route::job_part(id, "image.exr")).wait(Duration::from_secs(60));
+        let mut call = Call::new(Method::GET, route::job_part(id, "image.exr")).wait(Duration::from_mins(1));
         if let Some(etag) = known {
             call = call.header(IF_NONE_MATCH, etag);
         }
         if let Some(wait) = wait {
             call =
-                call.header(PREFER, &format!("wait={}", wait.as_secs())).wait(wait + Duration::from_secs(60));
+                call.header(PREFER, &format!("wait={}", wait.as_secs())).wait(wait + Duration::from_mins(1));
         }
         self.send(&call).await
     }
 
     /// The picture so far as PNG.
     pub async fn developed(&self, id: &JobId, how: &Development) -> Result<Answer, ClientError> {
-        let mut call = Call::new(Method::GET, route::job_part(id, "image.png")).wait(Duration::from_secs(60));
+        let mut call = Call::new(Method::GET, route::job_part(id, "image.png")).wait(Duration::from_mins(1));
         if let Some(layer) = &how.layer {
             call = call.query("layer", layer);
         }
         if let Some(exposure) = how.exposure {
-            call = call.query("exposure", exposure);
+            call = call.query("exposure", &exposure);
         }
         if let Some(width) = how.width {
-            call = call.query("width", width);
+            call = call.query("width", &width);
         }
         self.send(&call).await
     }

@@ -6,7 +6,7 @@ use reqwest::Method;
 use std::time::Duration;
 
 /// A large scene is parsed before the farm answers.
-const PARSING: Duration = Duration::from_secs(600);
+const PARSING: Duration = Duration::from_mins(10);
 
 impl Client {
     /// Makes sure that the farm has the file: asks by name first, so that a second upload costs nothing.

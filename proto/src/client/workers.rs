@@ -17,7 +17,7 @@ use reqwest::{Method, header::HeaderName};
 use std::time::Duration;
 
 /// The farm reads and keeps a sum before it answers.
-const COMMITTING: Duration = Duration::from_secs(60);
+const COMMITTING: Duration = Duration::from_mins(1);
 
 impl Client {
     /// A worker joins; tried once, the worker has its own patience.

@@ -19,9 +19,9 @@ impl Cancel {
     pub(crate) async fn run(self) -> Outcome {
         let status = self.farm.client()?.cancel(&self.job).await?;
         if self.farm.json {
-            terminal::json(&status)
+            terminal::json(&status);
         } else {
-            terminal::result(&progress::line(&status))
+            terminal::result(&progress::line(&status));
         }
         Ok(())
     }

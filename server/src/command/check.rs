@@ -37,11 +37,9 @@ struct Warning<'a> {
 
 impl Check {
     /// Looks.
-    pub(crate) async fn run(self) -> Outcome {
-        let contents = tokio::task::block_in_place(|| {
-            let bytes = scene_file::bytes(&self.scene)?;
-            inspect(bytes, &Limits::default()).map_err(|e| scene_file::fault(&self.scene, &e))
-        })?;
+    pub(crate) fn run(self) -> Outcome {
+        let bytes = scene_file::bytes(&self.scene)?;
+        let contents = inspect(bytes, &Limits::default()).map_err(|e| scene_file::fault(&self.scene, &e))?;
         if self.json {
             terminal::json(&document(&contents));
         } else {

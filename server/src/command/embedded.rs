@@ -38,18 +38,18 @@ impl Embedded {
     /// Starts it.
     pub(crate) async fn start(plan: Plan) -> Outcome<Self> {
         let mut folder = None;
-        let data = match plan.data {
-            Some(data) => data,
-            None => {
-                let made = tempfile::Builder::new().prefix("ovtigre-").tempdir();
-                let made =
-                    made.map_err(|e| CommandError::wrong(format!("cannot make a temporary folder: {e}")))?;
-                folder.insert(made).path().to_owned()
-            }
+        let data = if let Some(data) = plan.data {
+            data
+        } else {
+            let made = tempfile::Builder::new().prefix("ovtigre-").tempdir();
+            let made =
+                made.map_err(|e| CommandError::wrong(format!("cannot make a temporary folder: {e}")))?;
+            folder.insert(made).path().to_owned()
         };
         let cache = data.join("worker-scenes");
         let listen = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
-        let serving = start(ServeConfig { listen, data }).await.map_err(CommandError::failed)?;
+        let serving =
+            start(ServeConfig { listen, data }).await.map_err(|e| CommandError::failed(e.to_string()))?;
         let threads = plan.threads.map_or_else(|| share_of_cores(plan.workers), NonZeroUsize::get);
         let farm = serving.address;
         let team = Team { count: plan.workers, threads, farm, cache, log: plan.log };

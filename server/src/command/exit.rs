@@ -36,18 +36,18 @@ pub(crate) type Outcome<T = ()> = Result<T, CommandError>;
 
 impl CommandError {
     /// Wrong usage or bad scene.
-    pub(crate) fn wrong(line: impl ToString) -> Self {
-        Self { exit: Exit::Wrong, line: line.to_string() }
+    pub(crate) fn wrong(line: impl Into<String>) -> Self {
+        Self { exit: Exit::Wrong, line: line.into() }
     }
 
     /// The job failed, or what should carry it out.
-    pub(crate) fn failed(line: impl ToString) -> Self {
-        Self { exit: Exit::Failed, line: line.to_string() }
+    pub(crate) fn failed(line: impl Into<String>) -> Self {
+        Self { exit: Exit::Failed, line: line.into() }
     }
 
     /// Stopped before done.
-    pub(crate) fn stopped(line: impl ToString) -> Self {
-        Self { exit: Exit::Stopped, line: line.to_string() }
+    pub(crate) fn stopped(line: impl Into<String>) -> Self {
+        Self { exit: Exit::Stopped, line: line.into() }
     }
 }
 

@@ -82,7 +82,7 @@ impl Command {
             Self::Resume(command) => command.run().await?,
             Self::Cancel(command) => command.run().await?,
             Self::Workers(command) => command.run().await?,
-            Self::Check(command) => command.run().await?,
+            Self::Check(command) => command.run()?,
             Self::Compare(command) => return command.run(),
         }
         Ok(ExitCode::SUCCESS)

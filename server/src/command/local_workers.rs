@@ -23,7 +23,7 @@ use tokio_util::sync::CancellationToken;
 /// Times in a row that a worker is started again.
 const RESTARTS: u32 = 4;
 /// A worker that lived this long starts with a clean slate.
-const LIVED: Duration = Duration::from_secs(60);
+const LIVED: Duration = Duration::from_mins(1);
 /// Time that a worker has to hand back its batches.
 const FAREWELL: Duration = Duration::from_secs(4);
 /// Lines of a worker's log that are kept for the day it fails.

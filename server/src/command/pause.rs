@@ -20,9 +20,9 @@ impl Pause {
         let patch = JobPatch { state: Some(JobState::Paused), ..JobPatch::default() };
         let status = self.farm.client()?.change(&self.job, &patch).await?;
         if self.farm.json {
-            terminal::json(&status)
+            terminal::json(&status);
         } else {
-            terminal::result(&progress::line(&status))
+            terminal::result(&progress::line(&status));
         }
         Ok(())
     }

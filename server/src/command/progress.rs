@@ -22,7 +22,7 @@ impl Progress {
     /// Nothing shown yet. Among `other_lines` there is no place for a bar.
     pub(crate) fn new(other_lines: Others) -> Self {
         let bar = (terminal::is_watched() && other_lines == Others::None).then(|| {
-            let style = ProgressStyle::with_template("{elapsed:>4} [{bar:24}] {msg}");
+            let style = ProgressStyle::with_template("{elapsed:>4} [{bar:24}] {wide_msg}");
             let bar = ProgressBar::new(STEPS);
             bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> "));
             bar.enable_steady_tick(Duration::from_millis(200));
@@ -41,7 +41,7 @@ impl Progress {
         }
         if let Some(bar) = &self.bar {
             bar.set_position((fraction(status) * STEPS as f64) as u64);
-            bar.set_message(line(status));
+            bar.set_message(words::list(&parts(status)));
         } else if self.last_line.is_none_or(|at| at.elapsed() >= LINES_APART)
             && status.state != JobState::Queued
         {
@@ -87,17 +87,23 @@ fn fraction(status: &JobStatus) -> f64 {
 
 /// One line: samples, error, speed, time.
 pub(crate) fn line(status: &JobStatus) -> String {
+    let mut parts = parts(status);
+    parts.insert(parts.len() - 1, words::duration(status.wall_seconds));
+    words::list(&parts)
+}
+
+/// State, samples, error, speed, time left; some empty.
+fn parts(status: &JobStatus) -> Vec<String> {
     let state = match status.state {
         JobState::Running => String::new(),
         other => other.name().to_owned(),
     };
     let left = status.eta_seconds.filter(|_| !status.state.is_over());
-    words::list(&[
+    vec![
         state,
         words::samples(status),
         words::error(status.error.as_ref()),
         words::speed(status),
-        words::duration(status.wall_seconds),
         left.map(|left| format!("{} left", words::duration(left))).unwrap_or_default(),
-    ])
+    ]
 }

@@ -51,7 +51,7 @@ impl Serve {
         let interrupt = Interrupt::listen();
         let cache = self.data.join("worker-scenes");
         let config = ServeConfig { listen: self.listen, data: self.data };
-        let serving = start(config).await.map_err(CommandError::wrong)?;
+        let serving = start(config).await.map_err(|e| CommandError::wrong(e.to_string()))?;
         terminal::result(&format!("http://{}", serving.address));
         let workers = LocalWorkers::start(&Team {
             count: self.workers,

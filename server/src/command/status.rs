@@ -24,9 +24,9 @@ impl Status {
         if let Some(job) = &self.job {
             let status = client.job(job).await?;
             if self.farm.json {
-                terminal::json(&status)
+                terminal::json(&status);
             } else {
-                show(&status)
+                show(&status);
             }
             return Ok(());
         }

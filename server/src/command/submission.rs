@@ -87,6 +87,13 @@ impl Submission {
             words::error(status.error.as_ref()),
             words::duration(status.wall_seconds),
         ]));
+        if let Some(target) =
+            status.error_target.filter(|_| !status.certified && status.state == JobState::Done)
+        {
+            terminal::remark(&format!(
+                "warning: the error is not certified to be under {target}: it needs more samples"
+            ));
+        }
         match status.state {
             JobState::Done => Ok(()),
             _ => Err(CommandError::stopped("stopped before done; the picture so far is written")),

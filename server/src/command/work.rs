@@ -34,7 +34,7 @@ impl Work {
         let config = self.work.config(u64::from(std::process::id()));
         run(config, bell).await.map_err(|error| match error {
             WorkerError::Refused(error @ ClientError::Unexpected { .. }) => error.into(),
-            other => CommandError::wrong(other),
+            other => CommandError::wrong(other.to_string()),
         })
     }
 }
