@@ -1,12 +1,12 @@
 //! Bad input gets one clear line that says what and where, and exit code 2.
 
+use glam::Vec3;
 use ovtigre_tests::{
     glb::{Glb, glb},
     program::run,
     room::room,
     scenes::{lambert, quad},
 };
-use glam::Vec3;
 use serde_json::{Value, json};
 use std::{fs, path::Path};
 
@@ -72,7 +72,8 @@ fn what_a_scene_refers_to_stays_in_its_folder_and_in_bounds() {
     let folder = tempfile::tempdir().unwrap();
     fs::create_dir(folder.path().join("inner")).unwrap();
     fs::write(folder.path().join("secret.bin"), [0; 64]).unwrap();
-    let outside = json!({"asset": {"version": "2.0"}, "buffers": [{"uri": "../secret.bin", "byteLength": 64}]});
+    let outside =
+        json!({"asset": {"version": "2.0"}, "buffers": [{"uri": "../secret.bin", "byteLength": 64}]});
     let path = folder.path().join("inner/outside.gltf");
     fs::write(&path, outside.to_string()).unwrap();
     refused(&path, &["../secret.bin", "/buffers/0"]);
