@@ -125,3 +125,93 @@ impl Serving {
         self.farm.close().await;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::Instant;
+    use tokio::{
+        io::{AsyncReadExt as _, AsyncWriteExt as _},
+        net::TcpStream,
+    };
+
+    fn config(data: &Path) -> ServeConfig {
+        ServeConfig { listen: ([127, 0, 0, 1], 0).into(), data: data.to_owned() }
+    }
+
+    /// What comes until `end` is in it, or the connection ends.
+    async fn read_until(stream: &mut TcpStream, end: &str) -> String {
+        let mut text = Vec::new();
+        while !String::from_utf8_lossy(&text).contains(end) && stream.read_buf(&mut text).await.unwrap() > 0 {
+        }
+        String::from_utf8(text).unwrap()
+    }
+
+    async fn ask(address: SocketAddr, request: String, end: &str) -> (TcpStream, String) {
+        let mut stream = TcpStream::connect(address).await.unwrap();
+        stream.write_all(request.as_bytes()).await.unwrap();
+        let answer = read_until(&mut stream, end).await;
+        (stream, answer)
+    }
+
+    fn post(path: &str, kind: &str, body: &str) -> String {
+        let length = body.len();
+        format!(
+            "POST {path} HTTP/1.1\r\nhost: x\r\ncontent-type: {kind}\r\ncontent-length: {length}\r\n\r\n{body}"
+        )
+    }
+
+    #[tokio::test(flavor = "multi_thread")]
+    async fn a_farm_stops_at_once_though_somebody_listens_to_events_and_goes_on_later() {
+        let folder = tempfile::tempdir().unwrap();
+        let farm = start(config(folder.path())).await.unwrap();
+        let triangle = r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],
+            "meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],
+            "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]}],
+            "bufferViews":[{"buffer":0,"byteLength":36}],
+            "buffers":[{"byteLength":36,"uri":"data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}]}"#;
+        let (_, answer) =
+            ask(farm.address, post("/v1/scenes", "model/gltf+json", triangle), "warnings").await;
+        let scene = blake3::hash(triangle.as_bytes()).to_hex().to_string();
+        assert!(answer.starts_with("HTTP/1.1 201") && answer.contains(&scene), "{answer}");
+        let job = format!(r#"{{"scene":"{scene}"}}"#);
+        let (_, answer) = ask(farm.address, post("/v1/jobs", "application/json", &job), "\"warnings\"").await;
+        assert!(answer.starts_with("HTTP/1.1 202"), "{answer}");
+        let location = answer.lines().find_map(|line| line.strip_prefix("location: ")).unwrap().to_owned();
+        let listen = format!("GET {location}/events HTTP/1.1\r\nhost: x\r\n\r\n");
+        let (mut stream, answer) = ask(farm.address, listen, "\"event\":\"status\"").await;
+        assert!(answer.contains("text/event-stream"), "{answer}");
+
+        let begun = Instant::now();
+        farm.stop().await;
+        assert!(begun.elapsed() < Duration::from_secs(3), "{:?}", begun.elapsed());
+        read_until(&mut stream, "never").await;
+
+        let farm = start(config(folder.path())).await.unwrap();
+        let get = format!("GET {location} HTTP/1.1\r\nhost: x\r\nconnection: close\r\n\r\n");
+        let (_, answer) = ask(farm.address, get, "never").await;
+        assert!(answer.contains("\"queued\""), "{answer}");
+        farm.stop().await;
+    }
+
+    #[tokio::test(flavor = "multi_thread")]
+    async fn a_second_farm_in_the_same_folder_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let farm = start(config(folder.path())).await.unwrap();
+        let second = start(config(folder.path())).await.unwrap_err();
+        assert!(matches!(second, ServeError::Taken(_)), "{second}");
+        farm.stop().await;
+        start(config(folder.path())).await.unwrap().stop().await;
+    }
+
+    #[tokio::test]
+    async fn what_cannot_be_used_is_said() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("file");
+        std::fs::write(&file, "x").unwrap();
+        assert!(matches!(start(config(&file)).await.unwrap_err(), ServeError::Folder { .. }));
+        std::fs::write(folder.path().join("farm.sqlite"), "this is no database, but text of some length")
+            .unwrap();
+        assert!(matches!(start(config(folder.path())).await.unwrap_err(), ServeError::Store(_)));
+    }
+}

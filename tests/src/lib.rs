@@ -2,5 +2,6 @@
 
 pub mod glb;
 pub mod picture;
+pub mod program;
 pub mod room;
 pub mod scenes;

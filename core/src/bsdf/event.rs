@@ -30,6 +30,7 @@ impl Letters {
     }
 
     /// Letters in either set.
+    #[must_use]
     pub const fn union(self, other: Self) -> Self {
         Self(self.0 | other.0)
     }
@@ -43,13 +44,13 @@ impl Letters {
 /// Which way light is carried along a walk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Transport {
-    /// A walk from the eye: `wi` points to where light comes from. Refraction scales radiance by (η_o/η_i)².
+    /// A walk from the eye: `wi` points to where light comes from. Refraction scales radiance by (ηₒ/ηᵢ)².
     Radiance,
     /// A walk from the light: no such factor.
     Importance,
 }
 
-/// `f · |cos θ_i|` of one pair of directions, by letter. A delta lobe has no value here.
+/// `f · |cos θᵢ|` of one pair of directions, by letter. A delta lobe has no value here.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Scattered {
     /// Letter `D`.
@@ -83,12 +84,12 @@ pub enum SampleKind {
     /// Finite density: `value` and `pdf` are those of **all** smooth lobes together at `wi`
     /// (what `eval` and `pdf` return), `pdf` over solid angle.
     Smooth {
-        /// f · |cos θ_i|, by letter.
+        /// f · |cos θᵢ|, by letter.
         value: Scattered,
         /// Density over solid angle.
         pdf: f32,
     },
-    /// Letter `S_M`: `weight` is f · |cos θ_i| over the discrete probability of this choice.
+    /// Letter `S_M`: `weight` is f · |cos θᵢ| over the discrete probability of this choice.
     Specular {
         /// Throughput factor.
         weight: Rgb,

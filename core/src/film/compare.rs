@@ -18,7 +18,7 @@ pub struct Comparison {
 pub struct Difference {
     /// √(mean over pixels and channels of the squared difference).
     pub rms_error: f64,
-    /// √(mean over pixels of [Σ_c d² / 3] / (Y² + 0.01 Ȳ²)), Y the second picture's 3×3 mean luminance.
+    /// √(mean over pixels of `[Σ_c d² / 3]` / (Y² + 0.01 Ȳ²)), Y the second picture's 3×3 mean luminance.
     pub relative_error: f64,
     /// Mean of the first over mean of the second, over all channels; 1 where both are black.
     pub mean_ratio: f64,
@@ -79,7 +79,7 @@ fn difference(width: usize, height: usize, a: [&[f32]; 3], b: [&[f32]; 3]) -> Di
     Difference {
         rms_error: (square / pixels as f64).sqrt(),
         relative_error: (relative / pixels as f64).sqrt(),
-        mean_ratio: if sum_a == sum_b { 1.0 } else { sum_a / sum_b },
+        mean_ratio: if sum_a - sum_b == 0.0 { 1.0 } else { sum_a / sum_b },
     }
 }
 

@@ -13,7 +13,7 @@ pub const FALSE_STOP_PROBABILITY: f64 = 0.05;
 pub struct ErrorEstimate {
     /// √(mean over pixels and channels of the variance of the mean).
     pub rms: f64,
-    /// √(mean over pixels of [Σ_c v / 3] / (Y² + ε Ȳ²)), Y the 3×3 mean luminance.
+    /// √(mean over pixels of `[Σ_c v / 3]` / (Y² + ε Ȳ²)), Y the 3×3 mean luminance.
     pub relative: f64,
     /// Upper end of the interval of `relative`; needs three replicates.
     pub relative_upper: Option<f64>,

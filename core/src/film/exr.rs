@@ -134,9 +134,6 @@ pub fn write_partial(sum: &Sum, frame: Size, attributes: &PartialAttributes) -> 
 pub fn read_partial(bytes: &[u8], pixels_max: usize) -> Result<(Sum, PartialAttributes), ExrError> {
     let layers = decode(bytes, pixels_max as u64 * 3 * 64)?;
     let find = |name: &'static str| layers.attributes.get(name).ok_or(ExrError::Attribute(name));
-    fn number<T: std::str::FromStr>(text: &str, name: &'static str) -> Result<T, ExrError> {
-        text.parse().map_err(|_| ExrError::Attribute(name))
-    }
     if find("ovtigre.semantics")? != "sum" {
         return Err(ExrError::Attribute("ovtigre.semantics"));
     }
@@ -169,6 +166,10 @@ pub fn read_partial(bytes: &[u8], pixels_max: usize) -> Result<(Sum, PartialAttr
         method: find("ovtigre.method")?.clone(),
     };
     Ok((sum, attributes))
+}
+
+fn number<T: std::str::FromStr>(text: &str, name: &'static str) -> Result<T, ExrError> {
+    text.parse().map_err(|_| ExrError::Attribute(name))
 }
 
 fn sum_plane(layers: &Layers, prefix: &str) -> Result<Plane, ExrError> {

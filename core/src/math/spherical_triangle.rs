@@ -56,7 +56,7 @@ mod tests {
     /// Mean of (x, y², xyz…) over the solid angle, by area sampling in f64.
     fn reference(t: [Vec3; 3]) -> ([f64; 4], f64) {
         let n = 400;
-        let [a, b, c] = t.map(|v| v.as_dvec3());
+        let [a, b, c] = t.map(Vec3::as_dvec3);
         let normal = (b - a).cross(c - a);
         let (mut sums, mut total) = ([0.0; 4], 0.0);
         for i in 0..n * n {

@@ -60,13 +60,13 @@ pub fn radiance(scene: &Scene, rules: WalkRules, ray: Ray, sampler: &Sampler, ra
         *rays += 1;
         let key = || sampler.key(Dimension::Eye(walk.scatterings, Use::Alpha));
         let Some(hit) = scene.closest(&walk.ray, key) else {
-            return radiance + walk.throughput * walk.from_environment();
+            return radiance + walk.throughput * walk.environment_light();
         };
         let at = scene.data.interaction(hit.instance, hit.triangle, hit.barycentric);
         let back = -walk.ray.direction;
         let distance = (at.position - walk.ray.origin).length();
         walk.throughput *= walk.media.transmittance_to(distance, &at, back);
-        radiance += walk.throughput * walk.from_surface(&at, (hit.instance, hit.triangle));
+        radiance += walk.throughput * walk.surface_light(&at, (hit.instance, hit.triangle));
         if walk.scatterings >= rules.bounces {
             return radiance;
         }
@@ -84,7 +84,7 @@ pub fn radiance(scene: &Scene, rules: WalkRules, ray: Ray, sampler: &Sampler, ra
 
 impl Walk<'_> {
     /// Environment light along the ray, weighted against next events.
-    fn from_environment(&self) -> Rgb {
+    fn environment_light(&self) -> Rgb {
         let Some(environment) = &self.scene.environment else { return Vec3::ZERO };
         let direction = self.ray.direction;
         let weight = match self.density {
@@ -97,7 +97,7 @@ impl Walk<'_> {
     }
 
     /// Light that the surface that was hit emits along the ray, weighted against next events.
-    fn from_surface(&self, at: &Interaction<'_>, triangle: (u32, u32)) -> Rgb {
+    fn surface_light(&self, at: &Interaction<'_>, triangle: (u32, u32)) -> Rgb {
         if !at.material.emits() {
             return Vec3::ZERO;
         }

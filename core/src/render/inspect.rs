@@ -6,8 +6,9 @@ use crate::gltf::limits::Limits;
 use crate::gltf::load::load;
 use crate::gltf::report::Report;
 use crate::render::prepare::is_lit;
+use crate::scene::camera::Camera;
 use crate::scene::data::SceneData;
-use crate::scene::material::Coverage;
+use crate::scene::material::{Coverage, Material};
 use crate::scene::punctual::PunctualKind;
 use std::sync::Arc;
 
@@ -43,13 +44,13 @@ pub fn inspect(bytes: impl Into<Arc<[u8]>>, limits: &Limits) -> Result<Contents,
         let list = if needed { &mut needs } else { &mut leaves_out };
         list.push(name.to_owned());
     }
-    let aspects = data.cameras.iter().map(|c| c.aspect()).collect();
+    let aspects = data.cameras.iter().map(Camera::aspect).collect();
     Ok(Contents { report: loaded.report, punctual, aspects, needs, leaves_out, warnings: loaded.warnings })
 }
 
 /// Each feature that a scene may need, and whether this one does.
 fn features(data: &SceneData) -> [(&'static str, bool); 11] {
-    let any = |of: fn(&crate::scene::material::Material) -> bool| data.materials.iter().any(of);
+    let any = |of: fn(&Material) -> bool| data.materials.iter().any(of);
     [
         ("triangles", data.meshes.iter().any(|m| !m.triangles.is_empty())),
         ("instances", data.instances.len() > 1),
@@ -59,7 +60,7 @@ fn features(data: &SceneData) -> [(&'static str, bool); 11] {
         ("alpha", any(|m| m.coverage != Coverage::Opaque)),
         ("transmission", any(|m| m.transmission.factor > 0.0)),
         ("volumes", any(|m| m.volume.is_some())),
-        ("emissive surfaces", any(|m| m.emits())),
+        ("emissive surfaces", any(Material::emits)),
         ("punctual lights", !data.punctual.is_empty()),
         ("default sky", !is_lit(data)),
     ]

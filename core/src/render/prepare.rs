@@ -8,6 +8,7 @@ use crate::scene::Scene;
 use crate::scene::camera::Camera;
 use crate::scene::data::SceneData;
 use crate::scene::environment::{Environment, EnvironmentError};
+use crate::scene::material::Material;
 use crate::scene::view::{LensInScene, View};
 use crate::settings::{CameraChoice, EnvironmentSource, Settings};
 use crate::trace::build_error::BuildError;
@@ -64,7 +65,7 @@ pub fn prepare(
 
 /// Whether a scene has light of its own.
 pub fn is_lit(data: &SceneData) -> bool {
-    !data.punctual.is_empty() || data.materials.iter().any(|m| m.emits())
+    !data.punctual.is_empty() || data.materials.iter().any(Material::emits)
 }
 
 fn view(data: &SceneData, settings: &Settings) -> Result<View, PrepareError> {

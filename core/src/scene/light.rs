@@ -106,13 +106,11 @@ pub fn triangle_pdf(
     direction: Vec3,
 ) -> f32 {
     let corners = data.corners(instance, triangle);
-    match by_solid_angle(corners, point) {
-        Some(spherical) => 1.0 / spherical.solid_angle(),
-        None => {
-            let cos = at.ng.dot(direction).abs();
-            (at.position - point).length_squared() / (cos * area(corners)).max(f32::MIN_POSITIVE)
-        }
+    if let Some(spherical) = by_solid_angle(corners, point) {
+        return 1.0 / spherical.solid_angle();
     }
+    let cos = at.ng.dot(direction).abs();
+    (at.position - point).length_squared() / (cos * area(corners)).max(f32::MIN_POSITIVE)
 }
 
 fn by_solid_angle(corners: [Vec3; 3], point: Vec3) -> Option<SphericalTriangle> {

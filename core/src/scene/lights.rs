@@ -18,7 +18,7 @@ const NONE: u32 = u32::MAX;
 /// All lights of a scene, chosen in proportion to their power.
 #[derive(Clone, Debug, Default)]
 pub struct Lights {
-    lights: Vec<Light>,
+    all: Vec<Light>,
     choice: AliasTable,
     /// For each instance, the light of each triangle; empty where none emits.
     by_triangle: Vec<Vec<u32>>,
@@ -68,17 +68,17 @@ impl Lights {
             }
         }
         let choice = AliasTable::new(&powers).unwrap_or_default();
-        Self { lights, choice, by_triangle, environment: from_environment }
+        Self { all: lights, choice, by_triangle, environment: from_environment }
     }
 
     /// Number of lights.
     pub fn len(&self) -> usize {
-        self.lights.len()
+        self.all.len()
     }
 
     /// Whether nothing shines.
     pub fn is_empty(&self) -> bool {
-        self.lights.is_empty()
+        self.all.is_empty()
     }
 
     /// A next event from `point`; its density includes the choice of the light.
@@ -90,11 +90,11 @@ impl Lights {
         choice: f32,
         place: Vec2,
     ) -> Option<NextEvent> {
-        if self.lights.is_empty() {
+        if self.all.is_empty() {
             return None;
         }
         let (index, probability, _) = self.choice.sample(choice);
-        let event = self.lights[index].sample(data, environment, point, place)?;
+        let event = self.all[index].sample(data, environment, point, place)?;
         Some(NextEvent { pdf: event.pdf * probability, ..event })
     }
 

@@ -1,1 +1,413 @@
+//! The doors, without a network: statuses, problems, tags, ranges, pages, events.
 
+use super::router;
+use crate::farm::tests::bench::{Bench, Spread, partial, rules, sum};
+use axum::{
+    Router,
+    body::Body,
+    http::{Method, Request, Response, StatusCode, header},
+};
+use futures::StreamExt as _;
+use ovtigre_proto::{
+    id::JobId,
+    lease::{Committed, ExchangeReply, WorkerJoined},
+    problem::Problem,
+    status::JobState,
+};
+use serde_json::{Value, json};
+use std::{sync::Arc, time::Duration};
+use tower::ServiceExt as _;
+
+struct Answer {
+    status: StatusCode,
+    headers: axum::http::HeaderMap,
+    body: bytes::Bytes,
+}
+
+impl Answer {
+    fn json(&self) -> Value {
+        serde_json::from_slice(&self.body).unwrap()
+    }
+
+    fn head(&self, name: &str) -> &str {
+        self.headers.get(name).map_or("", |v| v.to_str().unwrap())
+    }
+
+    /// The problem, which says the same as the status.
+    fn problem(&self, status: u16, kind: &str) -> Problem {
+        assert_eq!(self.head("content-type"), "application/problem+json", "{:?}", self.body);
+        let problem: Problem = serde_json::from_slice(&self.body).unwrap();
+        assert_eq!((self.status.as_u16(), problem.status), (status, status), "{problem:?}");
+        assert_eq!(problem.kind, format!("/problems/{kind}"), "{problem:?}");
+        problem
+    }
+}
+
+struct Doors {
+    bench: Bench,
+    router: Router,
+}
+
+impl Doors {
+    async fn open() -> Self {
+        let bench = Bench::new(rules()).await;
+        let router = router(Arc::clone(&bench.farm));
+        Self { bench, router }
+    }
+
+    async fn call(&self, request: Request<Body>) -> Response<Body> {
+        self.router.clone().oneshot(request).await.unwrap()
+    }
+
+    async fn send(
+        &self,
+        method: Method,
+        path: &str,
+        heads: &[(&str, &str)],
+        body: impl Into<Body>,
+    ) -> Answer {
+        let mut request = Request::builder().method(method).uri(path);
+        for (name, value) in heads {
+            request = request.header(*name, *value);
+        }
+        let response = self.call(request.body(body.into()).unwrap()).await;
+        let (parts, body) = response.into_parts();
+        let body = axum::body::to_bytes(body, usize::MAX).await.unwrap();
+        Answer { status: parts.status, headers: parts.headers, body }
+    }
+
+    async fn get(&self, path: &str) -> Answer {
+        self.send(Method::GET, path, &[], "").await
+    }
+
+    async fn post(&self, path: &str, json: &Value) -> Answer {
+        self.send(Method::POST, path, &[("content-type", "application/json")], json.to_string()).await
+    }
+
+    /// A job of 40 × 30 pixels and its id.
+    async fn job(&self, samples: u32) -> JobId {
+        let scene = self.bench.scene().await;
+        let made = self.post("/v1/jobs", &json!({"scene": scene, "size": "40x30", "samples": samples})).await;
+        assert_eq!(made.status, StatusCode::ACCEPTED, "{:?}", made.body);
+        made.json()["id"].as_str().unwrap().parse().unwrap()
+    }
+
+    async fn finish(&self, job: &JobId) {
+        let worker = self.bench.worker().await;
+        self.bench.work(&worker, Spread::Noisy).await;
+        self.bench.until_settled(job, JobState::Done).await;
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_job_is_rendered_over_http_alone() {
+    let doors = Doors::open().await;
+    let scene = blake3::hash(b"a scene").to_hex();
+    let put = doors.send(Method::PUT, &format!("/v1/scenes/{scene}"), &[], "a scene").await;
+    assert_eq!((put.status, put.json()["id"].as_str().unwrap()), (StatusCode::CREATED, scene.as_str()));
+    let again = doors.send(Method::POST, "/v1/scenes", &[], "a scene").await;
+    assert_eq!(again.status, StatusCode::OK);
+    assert_eq!(doors.get(&format!("/v1/scenes/{scene}/bytes")).await.body, "a scene");
+    assert_eq!(doors.get(&format!("/v1/scenes/{scene}")).await.json()["kind"], "scene");
+
+    let made =
+        doors.post("/v1/jobs", &json!({"scene": scene.as_str(), "size": [40, 30], "samples": 400})).await;
+    let job = made.json()["id"].as_str().unwrap().to_owned();
+    assert_eq!(made.head("location"), format!("/v1/jobs/{job}"));
+    let image = format!("/v1/jobs/{job}/image.exr");
+    doors.get(&image).await.problem(404, "no-picture-yet");
+
+    let join = json!({"name": "w", "threads": 1, "build": "0", "instruction_set": "any"});
+    let joined = doors.post("/v1/workers", &join).await;
+    assert_eq!(joined.status, StatusCode::CREATED);
+    let worker = serde_json::from_slice::<WorkerJoined>(&joined.body).unwrap().id;
+    let exchange = format!("/v1/workers/{worker}/exchange");
+    while doors.bench.farm.live(&job.parse().unwrap()).is_some() {
+        let reply = doors.post(&exchange, &json!({"wants": 4})).await;
+        for lease in serde_json::from_slice::<ExchangeReply>(&reply.body).unwrap().leases {
+            let path = format!("/v1/leases/{}/sum", lease.id);
+            let heads = [("ovtigre-seconds", "0.25"), ("content-type", "image/x-exr")];
+            let bytes = partial(&lease, &sum(lease.batch, Spread::Noisy));
+            let told = doors.send(Method::PUT, &path, &heads, bytes).await;
+            let told: Committed = serde_json::from_slice(&told.body).unwrap();
+            assert_eq!(told.commit, ovtigre_proto::lease::Commit::Accepted);
+        }
+        tokio::time::sleep(Duration::from_millis(2)).await;
+    }
+    let status = doors.get(&format!("/v1/jobs/{job}")).await.json();
+    assert_eq!((status["state"].as_str(), status["samples_done"].as_f64()), (Some("done"), Some(400.0)));
+    assert_eq!(doors.get(&image).await.status, StatusCode::OK);
+    let csv = String::from_utf8(doors.get(&format!("/v1/jobs/{job}/error.csv")).await.body.to_vec()).unwrap();
+    let rows = doors.get(&format!("/v1/jobs/{job}/error.json")).await.json();
+    assert_eq!(csv.lines().count(), 1 + rows["rows"].as_array().unwrap().len());
+    let workers = doors.get("/v1/workers").await.json();
+    assert_eq!(workers["items"][0]["batches_done"], status["batches_done"]);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn every_error_is_a_problem_document() {
+    let doors = Doors::open().await;
+    let json = ("content-type", "application/json");
+    doors.get("/v1/nothing").await.problem(404, "not-found");
+    doors.send(Method::DELETE, "/v1/jobs", &[], "").await.problem(405, "method-not-allowed");
+    doors.get("/v1/jobs/none").await.problem(404, "not-found");
+    doors.get("/v1/jobs/..%2f..").await.problem(404, "not-found");
+    doors.get("/v1/jobs/none/image.exr").await.problem(404, "not-found");
+    doors.get("/v1/jobs/none/events").await.problem(404, "not-found");
+    doors.get("/v1/scenes/zz").await.problem(404, "not-found");
+    doors.get("/v1/jobs?limit=0").await.problem(400, "invalid-parameter");
+    doors.get("/v1/jobs?limit=many").await.problem(400, "invalid-parameter");
+    doors.get("/v1/jobs?cursor=x").await.problem(400, "invalid-parameter");
+    doors.get("/v1/jobs?colour=red").await.problem(400, "invalid-parameter");
+    doors.send(Method::POST, "/v1/jobs", &[], "{}").await.problem(415, "unsupported-media-type");
+    let multipart = [("content-type", "multipart/form-data; boundary=x")];
+    doors.send(Method::POST, "/v1/scenes", &multipart, "x").await.problem(415, "unsupported-media-type");
+    doors.send(Method::POST, "/v1/jobs", &[json], "{").await.problem(400, "malformed-json");
+    doors.send(Method::POST, "/v1/jobs", &[json], "{} {}").await.problem(400, "malformed-json");
+    doors.send(Method::POST, "/v1/jobs", &[json], " ".repeat(2 << 20)).await.problem(413, "too-large");
+    let far = [json, ("content-length", "99999999")];
+    doors.send(Method::POST, "/v1/jobs", &far, "{}").await.problem(413, "too-large");
+    for (document, pointer) in [
+        (r#"{"samples": "many"}"#, "/samples"),
+        (r#"{"colour": 1}"#, "/colour"),
+        (r#"{"size": "0x0"}"#, "/size"),
+        (r#"{"layers": ["a", 3]}"#, "/layers/1"),
+        (r#"{"scene": "xyz"}"#, "/scene"),
+        (r#""x""#, ""),
+    ] {
+        let answer = doors.send(Method::POST, "/v1/jobs", &[json], document).await;
+        let problem = answer.problem(422, "invalid-document");
+        assert_eq!(problem.errors[0].pointer, pointer, "{problem:?}");
+    }
+    let problem = doors.post("/v1/jobs", &json!({})).await.problem(422, "invalid-job");
+    assert_eq!(problem.errors[0].pointer, "/scene");
+    let other = blake3::hash(b"other").to_hex();
+    doors.send(Method::PUT, &format!("/v1/scenes/{other}"), &[], "bytes").await.problem(422, "hash-mismatch");
+    doors.send(Method::PUT, "/v1/scenes/abc", &[], "bytes").await.problem(400, "invalid-hash");
+    let problem = doors.send(Method::POST, "/v1/scenes", &[], "bad").await.problem(422, "invalid-scene");
+    assert_eq!(problem.errors[0].pointer, "/meshes/0");
+    doors.send(Method::POST, "/v1/scenes", &[], "").await.problem(422, "invalid-scene");
+    doors.post("/v1/workers/none/exchange", &json!({})).await.problem(404, "not-found");
+    doors.send(Method::PUT, "/v1/leases/x_0_0_0_1/sum", &[], "x").await.problem(404, "not-found");
+    let failure = json!({"reason": "r", "kind": "worker"});
+    doors.post("/v1/leases/x/failure", &failure).await.problem(404, "not-found");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_sum_that_is_none_is_refused() {
+    let doors = Doors::open().await;
+    doors.job(400).await;
+    let worker = doors.bench.worker().await;
+    let lease = doors.bench.take(&worker, 1).await.remove(0);
+    let path = format!("/v1/leases/{}/sum", lease.id);
+    doors.send(Method::PUT, &path, &[], "not an EXR").await.problem(422, "invalid-sum");
+    let seconds = [("ovtigre-seconds", "soon")];
+    doors.send(Method::PUT, &path, &seconds, "x").await.problem(400, "invalid-header");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_picture_has_a_strong_tag_and_ranges() {
+    let doors = Doors::open().await;
+    let job = doors.job(400).await;
+    let worker = doors.bench.worker().await;
+    let path = format!("/v1/jobs/{job}/image.exr");
+    for lease in doors.bench.take(&worker, 4).await {
+        doors.bench.bring(&lease, Spread::Noisy).await;
+    }
+    doors.bench.until(&job, |s| s.batches_done == 4).await;
+    let first = doors.get(&path).await;
+    let tag = first.head("etag").to_owned();
+    assert!(tag.starts_with('"') && tag.ends_with('"'), "{tag}");
+    assert_eq!(doors.get(&path).await.body, first.body, "the same tag, the same bytes");
+    let same = doors.send(Method::GET, &path, &[("if-none-match", &tag)], "").await;
+    assert_eq!(
+        (same.status, same.body.len(), same.head("etag")),
+        (StatusCode::NOT_MODIFIED, 0, tag.as_str())
+    );
+
+    doors.finish(&job).await;
+    let whole = doors.get(&path).await;
+    let size = whole.body.len();
+    assert_ne!(whole.head("etag"), tag);
+    assert_eq!((whole.head("content-type"), whole.head("accept-ranges")), ("image/x-exr", "bytes"));
+    assert_eq!(whole.head("content-length"), size.to_string());
+    let part = doors.send(Method::GET, &path, &[("range", "bytes=4-9")], "").await;
+    assert_eq!((part.status, &part.body), (StatusCode::PARTIAL_CONTENT, &whole.body.slice(4..10)));
+    assert_eq!(part.head("content-range"), format!("bytes 4-9/{size}"));
+    let beyond = doors.send(Method::GET, &path, &[("range", "bytes=999999999-")], "").await;
+    beyond.problem(416, "range-not-satisfiable");
+    assert_eq!(beyond.head("content-range"), format!("bytes */{size}"));
+    let old = doors.send(Method::GET, &path, &[("range", "bytes=4-9"), ("if-range", &tag)], "").await;
+    assert_eq!(old.status, StatusCode::OK, "of another version: all of it");
+    let head = doors.send(Method::HEAD, &path, &[], "").await;
+    assert_eq!((head.status, head.body.len(), head.head("etag")), (StatusCode::OK, 0, whole.head("etag")));
+
+    let png = doors.get(&format!("/v1/jobs/{job}/image.png?width=20&exposure=-1")).await;
+    assert_eq!((png.status, &png.body[1..4]), (StatusCode::OK, &b"PNG"[..]));
+    let error = doors.get(&format!("/v1/jobs/{job}/image.png?layer=error")).await;
+    assert_eq!(error.status, StatusCode::OK);
+    assert_ne!(png.head("etag"), error.head("etag"));
+    doors.get(&format!("/v1/jobs/{job}/image.png?layer=none")).await.problem(404, "no-layer");
+    doors.get(&format!("/v1/jobs/{job}/image.png?exposure=NaN")).await.problem(400, "invalid-parameter");
+    doors.get(&format!("/v1/jobs/{job}/image.png?width=0")).await.problem(400, "invalid-parameter");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_wait_ends_with_the_next_version_or_in_time() {
+    let doors = Arc::new(Doors::open().await);
+    let job = doors.job(400).await;
+    let worker = doors.bench.worker().await;
+    let path = format!("/v1/jobs/{job}/image.exr");
+    let early = doors.send(Method::GET, &path, &[("prefer", "wait=0")], "").await;
+    early.problem(404, "no-picture-yet");
+    let waiting = {
+        let (doors, path) = (Arc::clone(&doors), path.clone());
+        tokio::spawn(async move { doors.send(Method::GET, &path, &[("prefer", "wait=20")], "").await })
+    };
+    tokio::time::sleep(Duration::from_millis(50)).await;
+    for lease in doors.bench.take(&worker, 1).await {
+        doors.bench.bring(&lease, Spread::Noisy).await;
+    }
+    let first = tokio::time::timeout(Duration::from_secs(10), waiting).await.unwrap().unwrap();
+    assert_eq!((first.status, first.head("preference-applied")), (StatusCode::OK, "wait"));
+    let heads = [("prefer", "wait=1"), ("if-none-match", first.head("etag"))];
+    let begun = std::time::Instant::now();
+    assert_eq!(doors.send(Method::GET, &path, &heads, "").await.status, StatusCode::NOT_MODIFIED);
+    assert!(begun.elapsed() >= Duration::from_millis(950));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn lists_are_read_page_by_page() {
+    let doors = Doors::open().await;
+    let mut made = Vec::new();
+    for _ in 0..5 {
+        made.push(doors.job(400).await.to_string());
+    }
+    made.reverse();
+    let mut seen = Vec::new();
+    let mut path = "/v1/jobs?limit=2".to_owned();
+    loop {
+        let page = doors.get(&path).await.json();
+        let items = page["items"].as_array().unwrap();
+        assert!(items.len() <= 2);
+        seen.extend(items.iter().map(|job| job["id"].as_str().unwrap().to_owned()));
+        match page["next"].as_str() {
+            Some(next) => path = format!("/v1/jobs?limit=2&cursor={next}"),
+            None => break,
+        }
+    }
+    assert_eq!(seen, made);
+    doors.bench.farm.cancel(&made[0].parse().unwrap()).await.unwrap();
+    let cancelled = doors.get("/v1/jobs?state=cancelled").await.json();
+    assert_eq!(cancelled["items"].as_array().unwrap().len(), 1);
+    assert_eq!(doors.get("/v1/jobs?state=queued").await.json()["items"].as_array().unwrap().len(), 4);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_job_is_sent_once_checked_changed_and_cancelled() {
+    let doors = Doors::open().await;
+    let scene = doors.bench.scene().await;
+    let request = json!({"scene": scene, "size": "40x30"});
+    let heads = [("content-type", "application/json"), ("idempotency-key", "k")];
+    let send = async |body: &Value| doors.send(Method::POST, "/v1/jobs", &heads, body.to_string()).await;
+    let (first, again) = (send(&request).await, send(&request).await);
+    assert_eq!((first.status, again.status), (StatusCode::ACCEPTED, StatusCode::ACCEPTED));
+    assert_eq!(first.json()["id"], again.json()["id"]);
+    send(&json!({"scene": scene})).await.problem(422, "idempotency-key-taken");
+    let dry = doors.post("/v1/jobs?dry_run=true", &request).await;
+    assert_eq!((dry.status, dry.json()["samples_asked"].as_u64()), (StatusCode::OK, Some(256)));
+    assert_eq!(doors.get("/v1/jobs").await.json()["items"].as_array().unwrap().len(), 1);
+
+    let path = first.head("location").to_owned();
+    let tag = doors.get(&path).await.head("etag").to_owned();
+    let patch = async |tag: &str, body: Value| {
+        let heads = [("content-type", "application/json"), ("if-match", tag)];
+        doors.send(Method::PATCH, &path, &heads, body.to_string()).await
+    };
+    let changed = patch(&tag, json!({"priority": 3})).await;
+    assert_eq!((changed.status, changed.json()["priority"].as_i64()), (StatusCode::OK, Some(3)));
+    assert_ne!(changed.head("etag"), tag);
+    patch(&tag, json!({"priority": 4})).await.problem(412, "changed-since");
+    patch("*", json!({"state": "done"})).await.problem(422, "invalid-job");
+    patch("3", json!({})).await.problem(400, "invalid-header");
+    assert_eq!(patch("*", json!({"state": "paused"})).await.json()["state"], "paused");
+
+    let cancelled = doors.send(Method::DELETE, &path, &[], "").await;
+    assert_eq!((cancelled.status, cancelled.json()["state"].as_str()), (StatusCode::OK, Some("cancelled")));
+    patch("*", json!({"priority": 4})).await.problem(409, "job-over");
+    let purged = doors.send(Method::DELETE, &format!("{path}?purge=true"), &[], "").await;
+    assert_eq!(purged.status, StatusCode::NO_CONTENT);
+    doors.get(&path).await.problem(404, "not-found");
+}
+
+/// Events of a stream until it ends: id and name.
+async fn events(doors: &Doors, path: &str, last: Option<&str>) -> (StatusCode, Vec<(String, String)>) {
+    let mut request = Request::builder().uri(path);
+    if let Some(last) = last {
+        request = request.header("last-event-id", last);
+    }
+    let response = doors.call(request.body(Body::empty()).unwrap()).await;
+    let status = response.status();
+    if status == StatusCode::OK {
+        assert_eq!(response.headers()[header::CONTENT_TYPE], "text/event-stream");
+    }
+    let mut text = String::new();
+    let mut body = response.into_body().into_data_stream();
+    while let Some(piece) = body.next().await {
+        text.push_str(std::str::from_utf8(&piece.unwrap()).unwrap());
+    }
+    let field = |event: &str, name: &str| {
+        let line = event.lines().find_map(|line| line.strip_prefix(name).map(str::to_owned));
+        line.unwrap_or_default().trim_start_matches(": ").to_owned()
+    };
+    let events = text.split("\n\n").filter(|event| event.contains("data:"));
+    (status, events.map(|event| (field(event, "id"), field(event, "event"))).collect())
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn events_tell_each_checkpoint_once_and_go_on_where_a_client_was() {
+    let doors = Arc::new(Doors::open().await);
+    let job = doors.job(4000).await;
+    let path = format!("/v1/jobs/{job}/events");
+    let live = {
+        let (doors, path) = (Arc::clone(&doors), path.clone());
+        tokio::spawn(async move { events(&doors, &path, None).await })
+    };
+    tokio::time::sleep(Duration::from_millis(30)).await;
+    doors.finish(&job).await;
+    let (_, seen) = tokio::time::timeout(Duration::from_secs(20), live).await.unwrap().unwrap();
+    let rows = doors.bench.farm.curve_rows(&job).await.unwrap().len();
+    let checkpoints =
+        |events: &[(String, String)]| events.iter().filter(|(_, name)| name == "checkpoint").count();
+    assert_eq!(checkpoints(&seen), rows);
+    assert_eq!(seen.first().unwrap().1, "status");
+    assert_eq!(seen.last().unwrap().1, "status", "the last word is how the job ended");
+
+    // Whatever a client saw last, nothing is told twice and nothing is missed.
+    for cut in 0..seen.len() - 1 {
+        let (status, rest) = events(&doors, &path, Some(&seen[cut].0)).await;
+        assert_eq!(status, StatusCode::OK);
+        assert_eq!(checkpoints(&seen[..=cut]) + checkpoints(&rest), rows, "after {:?}", seen[cut]);
+        assert_eq!(rest.last(), seen.last());
+    }
+    let (status, rest) = events(&doors, &path, Some(&seen.last().unwrap().0)).await;
+    assert_eq!((status, rest.len()), (StatusCode::NO_CONTENT, 0));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn probes_and_numbers_are_told() {
+    let doors = Doors::open().await;
+    doors.job(400).await;
+    assert_eq!(doors.get("/healthz").await.body, "ok\n");
+    assert_eq!(doors.get("/readyz").await.status, StatusCode::OK);
+    let scaling = doors.get("/v1/scaling").await.json();
+    assert_eq!((scaling["batches_waiting"].as_u64(), scaling["active_workers"].as_u64()), (Some(4), Some(0)));
+    let metrics = String::from_utf8(doors.get("/metrics").await.body.to_vec()).unwrap();
+    assert!(metrics.contains("\novtigre_jobs{state=\"queued\"} 1\n"), "{metrics}");
+    for line in metrics.lines().filter(|line| !line.starts_with('#')) {
+        assert!(line.rsplit_once(' ').unwrap().1.parse::<f64>().is_ok(), "{line}");
+    }
+    assert!(doors.get("/").await.head("content-type").starts_with("text/html"));
+    doors.bench.farm.stopping.cancel();
+    doors.get("/readyz").await.problem(503, "stopping");
+}

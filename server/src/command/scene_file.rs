@@ -31,8 +31,10 @@ pub(crate) fn bytes(path: &Path) -> Outcome<Vec<u8>> {
 /// What a fault of a scene is called: the file, and what the reader says.
 pub(crate) fn fault(path: &Path, fault: &impl ToString) -> CommandError {
     let fault = fault.to_string();
-    let fault = fault.strip_prefix("scene: ").unwrap_or(&fault);
-    CommandError::wrong(format!("{}: {fault}", path.display()))
+    match fault.strip_prefix("scene:") {
+        Some(rest) => CommandError::wrong(format!("{}:{rest}", path.display())),
+        None => CommandError::wrong(format!("{}: {fault}", path.display())),
+    }
 }
 
 #[derive(Debug)]

@@ -7,7 +7,7 @@ use super::{
     report, scene_file, terminal, words,
 };
 use ovtigre_proto::{
-    client::{farm::Client, file::Upload},
+    client::{error::ClientError, farm::Client, file::Upload},
     job::JobRequest,
     pair::{EnvironmentRequest, radiance},
     status::{JobState, JobStatus},
@@ -20,6 +20,7 @@ use std::{
 /// What is read and checked on this side before anything is started.
 #[derive(Debug)]
 pub(crate) struct Submission {
+    path: PathBuf,
     scene: Upload,
     environment: Option<Environment>,
     flags: JobFlags,
@@ -45,12 +46,13 @@ impl Submission {
             Some(text) => Some(environment(text).await?),
         };
         let name = scene.file_stem().unwrap_or(scene.as_os_str()).to_string_lossy().into_owned();
-        Ok(Self { scene: scene_file::read(scene).await?, environment, flags, name, output })
+        let path = scene.to_owned();
+        Ok(Self { path, scene: scene_file::read(scene).await?, environment, flags, name, output })
     }
 
     /// Uploads what the farm does not have, and submits.
     pub(crate) async fn submit(&self, client: &Client) -> Outcome<JobStatus> {
-        client.upload(&self.scene).await?;
+        client.upload(&self.scene).await.map_err(|e| unreadable(&self.path, e))?;
         let environment = match &self.environment {
             None => None,
             Some(Environment::Uniform(radiance)) => Some(EnvironmentRequest::Uniform(*radiance)),
@@ -122,4 +124,15 @@ fn key(request: &JobRequest) -> String {
     let text = serde_json::to_string(request).expect("a request is plain data");
     let hash = blake3::hash(format!("{}-{now}-{text}", std::process::id()).as_bytes());
     hash.to_hex().as_str()[..32].to_owned()
+}
+
+/// What the farm says of a scene that it cannot read, in the name that the scene has here.
+fn unreadable(path: &Path, error: ClientError) -> CommandError {
+    match &error {
+        ClientError::Problem(problem) if problem.status < 500 => match problem.errors.first() {
+            Some(found) => scene_file::fault(path, &found.detail),
+            None => error.into(),
+        },
+        _ => error.into(),
+    }
 }

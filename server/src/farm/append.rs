@@ -221,7 +221,7 @@ impl Farm {
         let mut kept = Vec::with_capacity(ledger.snapshots.len());
         for (lane, blocks) in &ledger.snapshots {
             let bytes = self.blobs.get(&BlobName::Prefix(live.id.clone(), *lane, *blocks)).await?;
-            let prefix = blocking(move || Prefix::from_bytes(&bytes)).await;
+            let prefix = blocking(move || Prefix::from_bytes(&bytes)).await?;
             kept.push(prefix.map_err(|e| FarmError::Damaged(e.to_string()))?);
         }
         let schedule = Arc::clone(&live.schedule);
@@ -301,7 +301,7 @@ impl Farm {
             }
             Ok(held)
         })
-        .await?;
+        .await??;
         self.counters.appended(appended, bytes);
         publish(live, held.as_ref().expect("loaded by the caller"));
         Ok(held)
@@ -324,7 +324,7 @@ impl Farm {
                 let (bytes, blocks) = (prefix.to_bytes(), prefix.blocks());
                 (held, bytes, blocks)
             })
-            .await;
+            .await?;
             held = back;
             self.blobs.put(&BlobName::Prefix(live.id.clone(), lane, blocks), bytes.into()).await?;
             self.store.set_snapshot(&live.id, lane, blocks).await?;
@@ -379,14 +379,14 @@ fn publish(live: &Live, merge: &Merge) {
     });
 }
 
-/// Runs work of the processor off the async threads.
-pub async fn blocking<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> T {
-    match tokio::task::spawn_blocking(work).await {
-        Ok(done) => done,
-        Err(error) => match error.try_into_panic() {
-            Ok(panic) => std::panic::resume_unwind(panic),
-            // Only a runtime that is shut down cancels it: nobody waits any more.
-            Err(_) => std::future::pending().await,
-        },
-    }
+/// Runs work of the processor off the async threads. A panic in it is an error of the one who waits.
+pub async fn blocking<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Result<T> {
+    tokio::task::spawn_blocking(work).await.map_err(|error| match error.try_into_panic() {
+        Ok(panic) => {
+            let text = panic.downcast_ref::<String>().map(String::as_str);
+            let text = text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no message");
+            FarmError::Damaged(format!("a defect of this program: {text}"))
+        }
+        Err(_) => FarmError::Stopping,
+    })
 }

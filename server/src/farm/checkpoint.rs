@@ -14,7 +14,7 @@ impl Farm {
     /// All lanes are at a checkpoint: its row of the curve is written down. Says how the job ends,
     /// where it ends here.
     pub(super) async fn look(&self, live: &Live, held: Held) -> Result<(Held, Option<Ending>)> {
-        let (mut held, found) = measure(live, held).await;
+        let (mut held, found) = measure(live, held).await?;
         let row = self.take_row(live, &mut held, found.as_ref()).await?;
         let merge = held.as_ref().expect("loaded by the caller");
         let reached = live.spec.error_target.is_some_and(|target| {
@@ -44,7 +44,7 @@ impl Farm {
         if samples.round() <= f64::from(last) {
             return Ok(held);
         }
-        let (mut held, found) = measure(live, held).await;
+        let (mut held, found) = measure(live, held).await?;
         self.take_row(live, &mut held, found.as_ref()).await?;
         Ok(held)
     }
@@ -79,7 +79,7 @@ impl Farm {
 }
 
 /// The error of what is appended. An estimate that is not finite is none.
-async fn measure(live: &Live, held: Held) -> (Held, Option<ErrorEstimate>) {
+async fn measure(live: &Live, held: Held) -> Result<(Held, Option<ErrorEstimate>)> {
     let region = live.spec.region;
     blocking(move || {
         let merge = held.as_ref().expect("loaded by the caller");

@@ -99,7 +99,7 @@ impl Farm {
             let hash = BlobId::of(sum.hash());
             Ok((sum, hash))
         })
-        .await
+        .await?
     }
 
     /// The sum waits in memory where there is room, else as a blob.

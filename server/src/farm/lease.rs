@@ -63,7 +63,7 @@ impl Farm {
     fn interval(&self) -> f64 {
         let crowd = f64::from(self.crew().active(self.rules.silence)) / self.rules.beats_per_second;
         // A lease is renewed several times before it ends.
-        crowd.clamp(self.rules.beat.as_secs_f64(), self.rules.lease.as_secs_f64() / 4.0)
+        crowd.max(self.rules.beat.as_secs_f64()).min(self.rules.lease.as_secs_f64() / 4.0)
     }
 
     async fn hear(&self, id: &WorkerId, said: &Exchange) -> Result<WorkerState> {

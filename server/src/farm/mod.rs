@@ -24,7 +24,7 @@ pub mod stop;
 pub mod submit;
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
 use crate::{
     blobs::Blobs,

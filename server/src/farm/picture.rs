@@ -153,7 +153,7 @@ impl Farm {
             drop(held);
             write_picture(&picture, &attributes)
         })
-        .await;
+        .await?;
         let made = Made { manifest, bytes: bytes.into() };
         live.set_made(made.clone());
         Ok(made)
@@ -172,7 +172,7 @@ impl Farm {
         let region = spec.region;
         if let (true, Some(manifest)) = (row.settled, &row.manifest) {
             let exr = self.blobs.get(&BlobName::Result(id.clone())).await?;
-            let png = blocking(move || develop_kept(&exr, region, &layer, &develop)).await?;
+            let png = blocking(move || develop_kept(&exr, region, &layer, &develop)).await??;
             return Ok((manifest.clone(), png));
         }
         let live = self.live(id).filter(|_| !row.settled).ok_or_else(|| FarmError::NoPicture(id.clone()))?;
@@ -189,7 +189,7 @@ impl Farm {
             };
             plane.map(|plane| png(region, &plane, &develop))
         })
-        .await;
+        .await?;
         let bytes = bytes.ok_or_else(|| FarmError::NoLayer("error".to_owned()))?;
         Ok((manifest, bytes.into()))
     }

@@ -115,7 +115,7 @@ impl Farm {
         let _turn = self.inspectors.acquire().await.map_err(|_| FarmError::Stopping)?;
         let bytes = self.blobs.get(name).await?;
         let inspect = self.inspect.clone();
-        blocking(move || (inspect.0)(bytes)).await.map_err(|fault| FarmError::Scene(vec![fault]))
+        blocking(move || (inspect.0)(bytes)).await?.map_err(|fault| FarmError::Scene(vec![fault]))
     }
 
     /// What is in an uploaded file.

@@ -1,6 +1,6 @@
 //! The farm's rules, with a renderer whose sums are made up.
 
-mod bench;
+pub(crate) mod bench;
 mod ending;
 mod faults;
 mod merging;

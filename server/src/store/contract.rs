@@ -1,1 +1,341 @@
 //! What every store does: one suite, run on each.
+
+use super::{
+    Store,
+    row::{
+        Added, BatchKey, Claim, CommitOutcome, CommitRow, IdempotencyKey, JobChange, JobFilter, Lane,
+        NewCheckpoint, NewCommit, NewJob, Progress, Settlement,
+    },
+};
+use ovtigre_proto::{
+    curve::CurveRow,
+    id::{BlobId, JobId, LeaseId, WorkerId},
+    lease::WorkerJoin,
+    scene::{SceneContent, SceneReport},
+    status::{JobState, WorkerState},
+};
+use std::{sync::Arc, time::Duration};
+
+const LONG: Duration = Duration::from_secs(60);
+const NOW: Duration = Duration::ZERO;
+
+fn id<T: std::str::FromStr<Err: std::fmt::Debug>>(text: &str) -> T {
+    text.parse().unwrap()
+}
+
+fn hash(n: u8) -> BlobId {
+    BlobId::of([n; 32])
+}
+
+fn batch(region: u32, replicate: u32, block: u32) -> BatchKey {
+    BatchKey { block, replicate, region }
+}
+
+fn new_job(name: &str) -> NewJob {
+    NewJob {
+        id: id(name),
+        name: format!("job {name}"),
+        scene: hash(1),
+        priority: 0,
+        spec: "{}".to_owned(),
+        regions: 2,
+        replicates: 2,
+    }
+}
+
+fn claim(job: &str, lease: &str, batch: BatchKey) -> Claim {
+    Claim { lease: id(lease), job: id(job), batch, worker: id("w") }
+}
+
+fn commit(job: &str, batch: BatchKey, of: u8) -> NewCommit {
+    let row = CommitRow { batch, hash: hash(of), worker_micros: 1000 + u64::from(of) };
+    NewCommit { job: id(job), row, worker: Some(id("w")), rays_per_second: 5.0 }
+}
+
+fn join() -> WorkerJoin {
+    WorkerJoin {
+        name: "anna".to_owned(),
+        threads: 3,
+        build: "1".to_owned(),
+        instruction_set: "any".to_owned(),
+        tags: vec!["big".to_owned()],
+    }
+}
+
+async fn with_job(store: &dyn Store, name: &str) -> JobId {
+    assert_eq!(store.add_job(new_job(name), None).await.unwrap(), Added::New);
+    id(name)
+}
+
+/// Runs the suite; `open` gives an empty store.
+pub(crate) async fn run<F: Future<Output = Arc<dyn Store>>>(open: impl Fn() -> F) {
+    scenes_are_remembered_once(&*open().await).await;
+    jobs_are_listed_page_by_page(&*open().await).await;
+    a_key_makes_one_job(&*open().await).await;
+    a_change_needs_the_version(&*open().await).await;
+    a_batch_is_claimed_once(&*open().await).await;
+    leases_are_renewed_released_and_run_out(&*open().await).await;
+    the_first_commit_counts(&*open().await).await;
+    what_is_over_is_cleared_and_what_is_removed_is_gone(&*open().await).await;
+    curves_and_snapshots_are_kept(&*open().await).await;
+    pauses_are_no_run_time(&*open().await).await;
+    workers_are_seen_and_lost(&*open().await).await;
+    many_at_once_are_each_done_once(open().await).await;
+}
+
+async fn scenes_are_remembered_once(store: &dyn Store) {
+    let content = SceneContent::Environment { width: 4, height: 2 };
+    let report = SceneReport { id: hash(1), bytes: 77, content };
+    store.add_scene(report.clone()).await.unwrap();
+    store.add_scene(SceneReport { bytes: 78, ..report.clone() }).await.unwrap();
+    assert_eq!(store.scene(&hash(1)).await.unwrap().unwrap().report, report);
+    assert!(store.scene(&hash(2)).await.unwrap().is_none());
+}
+
+async fn jobs_are_listed_page_by_page(store: &dyn Store) {
+    for name in ["a", "b", "c", "d"] {
+        with_job(store, name).await;
+    }
+    let list = async |state, before, limit| {
+        let rows = store.jobs(JobFilter { state, before, limit }).await.unwrap();
+        rows.into_iter().map(|row| (row.id.to_string(), row.sequence)).collect::<Vec<_>>()
+    };
+    let page = list(None, None, 3).await;
+    assert_eq!(page.iter().map(|(name, _)| name.as_str()).collect::<String>(), "dcb");
+    let rest = list(None, Some(page[2].1), 3).await;
+    assert_eq!((rest.len(), rest[0].0.as_str()), (1, "a"));
+    let change = JobChange { state: Some(JobState::Paused), ..JobChange::default() };
+    assert!(store.change_job(&id("c"), 1, change).await.unwrap());
+    assert_eq!(list(Some(JobState::Paused), None, 9).await.len(), 1);
+    assert_eq!(list(Some(JobState::Queued), None, 9).await.len(), 3);
+    let open: Vec<_> =
+        store.unsettled_jobs().await.unwrap().into_iter().map(|row| row.id.to_string()).collect();
+    assert_eq!(open, ["a", "b", "c", "d"], "the oldest first");
+    assert_eq!(store.counts().await.unwrap().jobs.iter().map(|(_, n)| n).sum::<u64>(), 4);
+}
+
+async fn a_key_makes_one_job(store: &dyn Store) {
+    let key = |text: &str| Some(IdempotencyKey { key: "k".to_owned(), fingerprint: text.to_owned() });
+    assert_eq!(store.add_job(new_job("a"), key("f")).await.unwrap(), Added::New);
+    assert_eq!(store.add_job(new_job("b"), key("f")).await.unwrap(), Added::Before(id("a")));
+    assert_eq!(store.add_job(new_job("b"), key("g")).await.unwrap(), Added::KeyTaken);
+    assert!(store.job(&id("b")).await.unwrap().is_none());
+    store.forget_keys(LONG).await.unwrap();
+    assert_eq!(store.add_job(new_job("b"), key("g")).await.unwrap(), Added::KeyTaken);
+    tokio::time::sleep(Duration::from_millis(3)).await;
+    store.forget_keys(NOW).await.unwrap();
+    assert_eq!(store.add_job(new_job("b"), key("g")).await.unwrap(), Added::New);
+}
+
+async fn a_change_needs_the_version(store: &dyn Store) {
+    let job = with_job(store, "a").await;
+    let priority = |n| JobChange { priority: Some(n), ..JobChange::default() };
+    assert!(store.change_job(&job, 1, priority(5)).await.unwrap());
+    assert!(!store.change_job(&job, 1, priority(6)).await.unwrap());
+    let row = store.job(&job).await.unwrap().unwrap();
+    assert_eq!((row.version, row.priority, row.state), (2, 5, JobState::Queued));
+    assert!(!store.change_job(&id("none"), 1, priority(6)).await.unwrap());
+}
+
+async fn a_batch_is_claimed_once(store: &dyn Store) {
+    let job = with_job(store, "a").await;
+    let claims = vec![
+        claim("a", "l1", batch(0, 0, 0)),
+        claim("a", "l2", batch(0, 0, 0)),
+        claim("a", "l3", batch(1, 1, 1)),
+        claim("a", "l4", batch(0, 0, 1)),
+        claim("none", "l5", batch(0, 0, 0)),
+    ];
+    assert_eq!(store.claim(claims, LONG).await.unwrap(), [true, false, false, true, false]);
+    let row = store.job(&job).await.unwrap().unwrap();
+    assert_eq!((row.state, row.version), (JobState::Running, 2));
+    assert!(row.started_at.is_some());
+    let ledger = store.ledger(&job).await.unwrap();
+    let lane = Lane { replicate: 0, region: 0 };
+    assert!(ledger.cursors.contains(&(lane, 2)) && ledger.cursors.len() == 4);
+    assert_eq!(ledger.leases.len(), 2);
+    assert_eq!(store.workers_of(&job).await.unwrap(), 1);
+    let pause = JobChange { state: Some(JobState::Paused), ..JobChange::default() };
+    assert!(store.change_job(&job, 2, pause).await.unwrap());
+    assert_eq!(store.claim(vec![claim("a", "l6", batch(0, 0, 2))], LONG).await.unwrap(), [false]);
+}
+
+async fn leases_are_renewed_released_and_run_out(store: &dyn Store) {
+    let job = with_job(store, "a").await;
+    let (w, l1, l2): (WorkerId, LeaseId, LeaseId) = (id("w"), id("l1"), id("l2"));
+    store.add_worker(&w, join()).await.unwrap();
+    let claims = vec![claim("a", "l1", batch(0, 0, 0)), claim("a", "l2", batch(0, 1, 0))];
+    store.claim(claims, Duration::from_millis(30)).await.unwrap();
+    assert_eq!(store.renew(&w, vec![l1.clone(), id("l9")], LONG).await.unwrap(), std::slice::from_ref(&l1));
+    assert!(store.renew(&id("other"), vec![l1.clone()], LONG).await.unwrap().is_empty());
+    assert!(store.expire().await.unwrap().iter().all(|r| r.lease.id == l2));
+    tokio::time::sleep(Duration::from_millis(50)).await;
+    store.expire().await.unwrap();
+    let ledger = store.ledger(&job).await.unwrap();
+    assert_eq!(ledger.returned, [batch(0, 1, 0)]);
+    assert_eq!(ledger.leases.len(), 1, "the renewed one is still there");
+    assert!(store.renew(&w, vec![l2.clone()], LONG).await.unwrap().is_empty());
+    assert_eq!(store.claim(vec![claim("a", "l3", batch(0, 1, 0))], LONG).await.unwrap(), [true], "again");
+    let released = store.release(&id("l3"), Some("no memory".to_owned())).await.unwrap().unwrap();
+    assert_eq!((released.failures, released.workers, released.lease.batch), (2, 1, batch(0, 1, 0)));
+    assert!(store.release(&id("l3"), None).await.unwrap().is_none());
+    let released = store.release(&l1, None).await.unwrap().unwrap();
+    assert_eq!((released.failures, released.workers), (0, 0), "handed back is no failure");
+    assert_eq!(store.worker(&w).await.unwrap().unwrap().failures, 2);
+}
+
+async fn the_first_commit_counts(store: &dyn Store) {
+    let job = with_job(store, "a").await;
+    store.add_worker(&id("w"), join()).await.unwrap();
+    store.claim(vec![claim("a", "l1", batch(0, 0, 0))], LONG).await.unwrap();
+    let bring = async |new| store.commit(new).await.unwrap();
+    assert_eq!(bring(commit("a", batch(0, 0, 1), 1)).await, CommitOutcome::NeverHandedOut);
+    assert_eq!(bring(commit("a", batch(7, 7, 0), 1)).await, CommitOutcome::NeverHandedOut);
+    assert_eq!(bring(commit("none", batch(0, 0, 0), 1)).await, CommitOutcome::NoJob);
+    assert_eq!(bring(commit("a", batch(0, 0, 0), 1)).await, CommitOutcome::First);
+    assert_eq!(bring(commit("a", batch(0, 0, 0), 1)).await, CommitOutcome::Same);
+    assert_eq!(bring(commit("a", batch(0, 0, 0), 2)).await, CommitOutcome::Differs { kept: hash(1) });
+    let ledger = store.ledger(&job).await.unwrap();
+    assert_eq!((ledger.leases.len(), ledger.returned.len()), (0, 0));
+    assert_eq!(ledger.commits, [commit("a", batch(0, 0, 0), 1).row]);
+    let lane = Lane { replicate: 0, region: 0 };
+    assert_eq!(store.commits(&job, lane, 0..9).await.unwrap(), ledger.commits);
+    assert!(store.commits(&job, lane, 1..9).await.unwrap().is_empty());
+    let worker = store.worker(&id("w")).await.unwrap().unwrap();
+    assert_eq!((worker.batches_done, worker.rays_per_second), (1, 5.0));
+    // A batch that was returned and came late is not handed out again.
+    store.claim(vec![claim("a", "l2", batch(0, 1, 0))], LONG).await.unwrap();
+    store.release(&id("l2"), None).await.unwrap();
+    assert_eq!(bring(commit("a", batch(0, 1, 0), 3)).await, CommitOutcome::First);
+    assert_eq!(store.claim(vec![claim("a", "l3", batch(0, 1, 0))], LONG).await.unwrap(), [false]);
+}
+
+async fn what_is_over_is_cleared_and_what_is_removed_is_gone(store: &dyn Store) {
+    let job = with_job(store, "a").await;
+    store
+        .claim(vec![claim("a", "l1", batch(0, 0, 0)), claim("a", "l2", batch(0, 1, 0))], LONG)
+        .await
+        .unwrap();
+    store.commit(commit("a", batch(0, 0, 0), 1)).await.unwrap();
+    let change = JobChange {
+        state: Some(JobState::Cancelled),
+        reason: Some("because".to_owned()),
+        ..JobChange::default()
+    };
+    assert!(store.change_job(&job, 2, change).await.unwrap());
+    let row = store.job(&job).await.unwrap().unwrap();
+    assert_eq!(
+        (row.state, row.reason.as_deref(), row.settled),
+        (JobState::Cancelled, Some("because"), false)
+    );
+    assert!(row.ended_at.is_some());
+    let ledger = store.ledger(&job).await.unwrap();
+    assert!(ledger.cursors.is_empty() && ledger.leases.is_empty() && ledger.commits.len() == 1);
+    assert_eq!(store.commit(commit("a", batch(0, 1, 0), 1)).await.unwrap(), CommitOutcome::JobOver);
+    assert_eq!(store.unsettled_jobs().await.unwrap().len(), 1);
+    let progress = Progress { samples: 2.5, batches: 1, worker_micros: 7, rays: 8, invalid: 9 };
+    let settlement = Settlement { progress, manifest: Some("m".to_owned()), certified: true };
+    let change = JobChange { settlement: Some(settlement), ..JobChange::default() };
+    assert!(store.change_job(&job, row.version, change).await.unwrap());
+    let row = store.job(&job).await.unwrap().unwrap();
+    assert_eq!((row.progress, row.manifest.as_deref()), (progress, Some("m")));
+    assert!(row.settled && row.certified && store.unsettled_jobs().await.unwrap().is_empty());
+    assert!(store.remove_job(&job).await.unwrap());
+    assert!(!store.remove_job(&job).await.unwrap());
+    assert!(store.job(&job).await.unwrap().is_none());
+    assert!(store.ledger(&job).await.unwrap().commits.is_empty());
+}
+
+async fn curves_and_snapshots_are_kept(store: &dyn Store) {
+    let job = with_job(store, "a").await;
+    let row = CurveRow {
+        samples: 4,
+        wall_seconds: 1.5,
+        worker_seconds: 2.5,
+        rays: 99,
+        rms_error: Some(0.5),
+        relative_error: Some(0.25),
+        relative_error_upper: None,
+    };
+    let progress = Progress { batches: 4, ..Progress::default() };
+    let second = CurveRow { samples: 8, ..row };
+    store.add_checkpoint(&job, NewCheckpoint { look: 1, row, progress }).await.unwrap();
+    store.add_checkpoint(&job, NewCheckpoint { look: 2, row: second, progress }).await.unwrap();
+    store.add_checkpoint(&job, NewCheckpoint { look: 1, row: second, progress }).await.unwrap();
+    assert_eq!(store.curve(&job).await.unwrap(), [row, second]);
+    assert_eq!(store.job(&job).await.unwrap().unwrap().progress, progress);
+    let lane = Lane { replicate: 1, region: 0 };
+    store.set_snapshot(&job, lane, 2).await.unwrap();
+    store.set_snapshot(&job, lane, 5).await.unwrap();
+    let ledger = store.ledger(&job).await.unwrap();
+    assert_eq!((ledger.snapshots, ledger.checkpoints), (vec![(lane, 5)], 2));
+}
+
+async fn pauses_are_no_run_time(store: &dyn Store) {
+    let job = with_job(store, "a").await;
+    let state = |s| JobChange { state: Some(s), ..JobChange::default() };
+    let run = async || store.job(&job).await.unwrap().unwrap().run_seconds;
+    assert!(run().await.abs() < 1e-9, "it has not begun");
+    store.claim(vec![claim("a", "l1", batch(0, 0, 0))], LONG).await.unwrap();
+    tokio::time::sleep(Duration::from_millis(40)).await;
+    store.change_job(&job, 2, state(JobState::Paused)).await.unwrap();
+    let paused = run().await;
+    assert!(paused >= 0.035, "{paused}");
+    tokio::time::sleep(Duration::from_millis(200)).await;
+    assert!((run().await - paused).abs() < 1e-9);
+    store.change_job(&job, 3, state(JobState::Running)).await.unwrap();
+    tokio::time::sleep(Duration::from_millis(20)).await;
+    let resumed = run().await;
+    assert!(resumed >= paused + 0.015 && resumed < paused + 0.15, "{paused} {resumed}");
+    store.change_job(&job, 4, state(JobState::Done)).await.unwrap();
+    let ended = run().await;
+    tokio::time::sleep(Duration::from_millis(20)).await;
+    assert!((run().await - ended).abs() < 1e-9);
+}
+
+async fn workers_are_seen_and_lost(store: &dyn Store) {
+    let (a, b): (WorkerId, WorkerId) = (id("a"), id("b"));
+    store.add_worker(&a, join()).await.unwrap();
+    store.add_worker(&b, join()).await.unwrap();
+    let row = store.worker(&a).await.unwrap().unwrap();
+    assert_eq!((row.join, row.state, row.leases), (join(), WorkerState::Active, 0));
+    assert!(store.lose_workers(LONG).await.unwrap().is_empty());
+    tokio::time::sleep(Duration::from_millis(60)).await;
+    assert!(store.see_worker(&a, WorkerState::Draining).await.unwrap());
+    assert_eq!(store.lose_workers(Duration::from_millis(40)).await.unwrap(), std::slice::from_ref(&b));
+    assert!(!store.see_worker(&id("none"), WorkerState::Active).await.unwrap());
+    assert!(store.set_worker_state(&a, WorkerState::Gone).await.unwrap());
+    let page = store.workers(None, 1).await.unwrap();
+    assert_eq!((page.len(), &page[0].1.id), (1, &b));
+    let rest = store.workers(Some(page[0].0), 5).await.unwrap();
+    assert_eq!((rest.len(), &rest[0].1.id, rest[0].1.state), (1, &a, WorkerState::Gone));
+    assert_eq!(store.counts().await.unwrap().workers.len(), 2);
+    store.ping().await.unwrap();
+}
+
+async fn many_at_once_are_each_done_once(store: Arc<dyn Store>) {
+    let job = with_job(&*store, "a").await;
+    let tasks = (0..40_u32).map(|n| {
+        let store = Arc::clone(&store);
+        tokio::spawn(async move {
+            let mut mine = Vec::new();
+            for block in 0..10 {
+                let key = batch(0, 0, block);
+                let lease = format!("l{n}-{block}");
+                if store.claim(vec![claim("a", &lease, key)], LONG).await.unwrap() == [true] {
+                    mine.push(block);
+                    assert_eq!(store.commit(commit("a", key, 1)).await.unwrap(), CommitOutcome::First);
+                }
+            }
+            mine
+        })
+    });
+    let mut blocks = Vec::new();
+    for mine in futures::future::join_all(tasks).await {
+        blocks.extend(mine.unwrap());
+    }
+    blocks.sort_unstable();
+    let claimed = store.ledger(&job).await.unwrap().commits.len();
+    assert_eq!(blocks.len(), claimed);
+    assert!(blocks.windows(2).all(|w| w[0] != w[1]) && claimed > 0, "{blocks:?}");
+}

@@ -120,12 +120,14 @@ impl Bench {
         reply.drop.is_empty()
     }
 
+    /// Brings a batch that took a millisecond a sample.
     pub(crate) async fn bring(&self, lease: &Lease, spread: Spread) -> Commit {
         self.bring_sum(lease, &sum(lease.batch, spread)).await.unwrap()
     }
 
     pub(crate) async fn bring_sum(&self, lease: &Lease, sum: &Sum) -> crate::farm::error::Result<Commit> {
-        self.farm.commit(&lease.id, partial(lease, sum), Duration::from_millis(100)).await
+        let time = Duration::from_millis(u64::from(lease.batch.block.count));
+        self.farm.commit(&lease.id, partial(lease, sum), time).await
     }
 
     /// Takes and brings until there is nothing to take; how many were brought.

@@ -213,3 +213,43 @@ impl Store for Sqlite {
         self.readers.close().await;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::store::{contract, error::StoreError};
+    use std::sync::Arc;
+
+    #[tokio::test(flavor = "multi_thread")]
+    async fn keeps_the_contract() {
+        let folder = tempfile::tempdir().unwrap();
+        let count = std::sync::atomic::AtomicU32::new(0);
+        contract::run(|| async {
+            let n = count.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+            let store = Sqlite::open(&folder.path().join(format!("{n}.sqlite"))).await.unwrap();
+            Arc::new(store) as Arc<dyn Store>
+        })
+        .await;
+    }
+
+    #[tokio::test]
+    async fn what_was_written_is_there_after_it_is_opened_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("farm.sqlite");
+        let store = Sqlite::open(&file).await.unwrap();
+        let id: WorkerId = "w".parse().unwrap();
+        let join = WorkerJoin {
+            name: "w".to_owned(),
+            threads: 1,
+            build: String::new(),
+            instruction_set: String::new(),
+            tags: Vec::new(),
+        };
+        store.add_worker(&id, join).await.unwrap();
+        store.close().await;
+        assert!(matches!(store.see_worker(&id, WorkerState::Active).await, Err(StoreError::Closed)));
+        assert!(matches!(store.worker(&id).await, Err(StoreError::Closed)));
+        let again = Sqlite::open(&file).await.unwrap();
+        assert!(again.worker(&id).await.unwrap().is_some());
+    }
+}

@@ -1,0 +1,114 @@
+//! The program `ovtigre` as processes: a farm, workers, commands.
+
+use std::{
+    ffi::OsStr,
+    io::{BufRead as _, BufReader},
+    path::{Path, PathBuf},
+    process::{Child, Command, Output, Stdio},
+    time::{Duration, Instant},
+};
+
+/// The program, built beside the tests.
+fn program() -> PathBuf {
+    let tests = std::env::current_exe().expect("this program has a path");
+    let program = tests.parent().and_then(Path::parent).expect("target/PROFILE/deps").join("ovtigre");
+    assert!(program.is_file(), "{} is not there: cargo build -p ovtigre", program.display());
+    program
+}
+
+/// Runs a command to its end.
+pub fn run<S: AsRef<OsStr>>(arguments: impl IntoIterator<Item = S>) -> Output {
+    Command::new(program()).args(arguments).stdin(Stdio::null()).output().expect("the program starts")
+}
+
+/// A process that is killed when it is dropped.
+#[derive(Debug)]
+pub struct Process(Child);
+
+impl Process {
+    /// SIGKILL: no farewell.
+    pub fn kill(mut self) {
+        self.end();
+    }
+
+    fn end(&mut self) {
+        // Either may fail because the process is gone: that is what is wanted.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        self.end();
+    }
+}
+
+/// A farm that listens on a free port of the loopback.
+#[derive(Debug)]
+pub struct Farm {
+    /// Its address.
+    pub url: String,
+    process: Process,
+}
+
+impl Farm {
+    /// Starts a farm over a folder.
+    pub fn start(data: &Path) -> Self {
+        let mut child = Command::new(program())
+            .args(["serve", "--listen", "127.0.0.1:0", "--data"])
+            .arg(data)
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("the program starts");
+        let mut line = String::new();
+        let stdout = child.stdout.take().expect("piped");
+        BufReader::new(stdout).read_line(&mut line).expect("the farm says where it listens");
+        Self { url: line.trim().to_owned(), process: Process(child) }
+    }
+
+    /// SIGKILL: no farewell.
+    pub fn kill(self) {
+        self.process.kill();
+    }
+
+    /// Starts a worker of one thread.
+    pub fn worker(&self) -> Process {
+        let child = Command::new(program())
+            .args(["work", "--threads", "1", "--server", &self.url])
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("the program starts");
+        Process(child)
+    }
+
+    /// Runs a client's command to its end and returns what it wrote; it must succeed.
+    pub fn client(&self, arguments: &[&str]) -> String {
+        let output = run(arguments.iter().copied().chain(["--server", &self.url]));
+        let error = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{arguments:?}: {error}");
+        String::from_utf8(output.stdout).expect("text")
+    }
+
+    /// The job as JSON.
+    pub fn job(&self, id: &str) -> serde_json::Value {
+        serde_json::from_str(&self.client(&["status", id, "--json"])).expect("JSON")
+    }
+
+    /// Waits until `reached` says so of the job, at most two minutes.
+    pub fn wait(&self, id: &str, reached: impl Fn(&serde_json::Value) -> bool) -> serde_json::Value {
+        let start = Instant::now();
+        loop {
+            let job = self.job(id);
+            if reached(&job) {
+                return job;
+            }
+            assert!(start.elapsed() < Duration::from_secs(120), "still {job}");
+            std::thread::sleep(Duration::from_millis(50));
+        }
+    }
+}
