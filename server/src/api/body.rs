@@ -9,6 +9,7 @@ use axum::{
 };
 use serde::de::DeserializeOwned;
 use serde_path_to_error::{Path, Segment};
+use std::fmt::Write as _;
 
 /// Bytes of a JSON document, at most.
 const JSON_MAX: usize = 1 << 20;
@@ -53,7 +54,7 @@ fn pointer(path: &Path) -> String {
     let mut pointer = String::new();
     for segment in path {
         match segment {
-            Segment::Seq { index } => pointer.push_str(&format!("/{index}")),
+            Segment::Seq { index } => write!(pointer, "/{index}").expect("writing to a string cannot fail"),
             Segment::Map { key } => {
                 pointer.push('/');
                 pointer.push_str(&key.replace('~', "~0").replace('/', "~1"));

@@ -31,6 +31,7 @@ impl ApiError {
     }
 
     /// With the places in a document that are at fault.
+    #[must_use]
     pub fn at(mut self, errors: Vec<Fault>) -> Self {
         self.0.errors = errors;
         self

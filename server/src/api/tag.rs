@@ -5,7 +5,7 @@ use axum::http::{HeaderMap, HeaderValue, header};
 use std::time::Duration;
 
 /// Longest wait for a change that is granted.
-const WAIT_MAX: Duration = Duration::from_secs(60);
+const WAIT_MAX: Duration = Duration::from_mins(1);
 
 /// A strong entity tag.
 pub fn strong(text: &str) -> HeaderValue {

@@ -7,6 +7,7 @@ use super::{
     live::{Arrival, Live, View},
     spec::LAYERS,
     split::lanes,
+    stop::can_end,
 };
 use crate::{
     blobs::{BlobError, BlobName},
@@ -116,7 +117,7 @@ impl Merge {
     }
 
     /// Takes what can be appended now, lowest block first.
-    pub fn next(&mut self) -> Next {
+    pub fn advance(&mut self) -> Next {
         let limit = self.limit();
         let mut heads: VecDeque<Lane> = lanes(&self.schedule).collect();
         let mut reach: BTreeMap<Lane, u32> = heads.iter().map(|l| (*l, self.prefix(*l).blocks())).collect();
@@ -207,7 +208,7 @@ impl Farm {
     pub async fn sums(&self, live: &Live) -> Result<Held> {
         let mut held = Arc::clone(&live.merge).lock_owned().await;
         if held.is_none() {
-            self.make_room(live).await;
+            self.make_room(live);
             *held = Some(self.load(live).await?);
         }
         if let Some(merge) = held.as_mut() {
@@ -232,7 +233,7 @@ impl Farm {
     }
 
     /// Lets go of sums that were not needed lately, until those of `live` fit beside the rest.
-    async fn make_room(&self, live: &Live) {
+    fn make_room(&self, live: &Live) {
         let mut others: Vec<(Instant, u64, Held)> = Vec::new();
         for other in self.lives() {
             if other.id != live.id
@@ -259,11 +260,11 @@ impl Farm {
             let merge = held.as_mut().expect("loaded above");
             live.arrivals().into_iter().for_each(|arrival| merge.add(arrival));
             if let Some(ending) = live.ending()
-                && self.can_end(merge, &ending)
+                && can_end(merge, &ending)
             {
                 return self.finish(live, held, ending).await.map(|()| true);
             }
-            match merge.next() {
+            match merge.advance() {
                 Next::Append(ready) => {
                     held = self.append(live, held, ready).await?;
                     held = self.snapshot(live, held).await?;

@@ -21,7 +21,7 @@ use ovtigre_proto::{
 use std::time::Duration;
 
 /// Longest time that is believed of one batch.
-const TIME_MAX: Duration = Duration::from_secs(30 * 24 * 3600);
+const TIME_MAX: Duration = Duration::from_hours(30 * 24);
 
 impl Farm {
     /// The partial EXR of a lease's batch, on which its worker spent `time`. The first sum of a

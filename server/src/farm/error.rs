@@ -83,7 +83,7 @@ pub enum FarmError {
 
 impl FarmError {
     /// Nothing of that name.
-    pub fn not_found(what: &'static str, id: impl ToString) -> Self {
+    pub fn not_found(what: &'static str, id: &(impl ToString + ?Sized)) -> Self {
         Self::NotFound { what, id: id.to_string() }
     }
 }

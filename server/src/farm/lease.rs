@@ -102,7 +102,7 @@ impl Farm {
             for progress in &said.holding {
                 match book.lease(&progress.lease).filter(|held| held.row.worker == *worker) {
                     Some(held) if held.renewed.elapsed() > self.rules.lease / 4 => {
-                        due.push(progress.lease.clone())
+                        due.push(progress.lease.clone());
                     }
                     Some(_) => {}
                     None => lost.push(progress.lease.clone()),
@@ -142,7 +142,9 @@ impl Farm {
             Ok(claimed) => claimed,
             Err(error) => {
                 let mut book = self.book();
-                offers.iter().for_each(|offer| book.put_back(&offer.job, offer.batch));
+                for offer in &offers {
+                    book.put_back(&offer.job, offer.batch);
+                }
                 return Err(error.into());
             }
         };

@@ -46,7 +46,7 @@ impl Farm {
     pub(super) async fn tick(self: Arc<Self>) {
         let mut beat = tokio::time::interval(self.rules.tick);
         beat.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
-        let mut hour = tokio::time::interval(Duration::from_secs(3600));
+        let mut hour = tokio::time::interval(Duration::from_hours(1));
         loop {
             let done = tokio::select! {
                 () = self.stopping.cancelled() => return,

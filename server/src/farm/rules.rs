@@ -50,7 +50,7 @@ impl Default for Rules {
             wants_max: 64,
             failing_workers: 3,
             failures: 5,
-            keys: Duration::from_secs(24 * 3600),
+            keys: Duration::from_hours(24),
             scene_bytes: 2 << 30,
         }
     }

@@ -13,12 +13,12 @@ use crate::{
 use ovtigre_proto::{id::JobId, status::JobState};
 use std::sync::Arc;
 
-impl Farm {
-    /// Whether the wish to end can be followed now.
-    pub(super) fn can_end(&self, merge: &Merge, ending: &Ending) -> bool {
-        ending.waits == Waits::Not || merge.has_picture()
-    }
+/// Whether the wish to end can be followed now.
+pub(super) fn can_end(merge: &Merge, ending: &Ending) -> bool {
+    ending.waits == Waits::Not || merge.has_picture()
+}
 
+impl Farm {
     /// Writes the picture that stays, then the job's last row, then removes what is not needed.
     pub(super) async fn finish(&self, live: &Arc<Live>, held: Held, ending: Ending) -> Result<()> {
         self.book().remove(&live.id);

@@ -59,13 +59,11 @@ impl Farm {
     }
 
     async fn upload_at(&self, pointer: &str, id: &BlobId) -> Result<SceneReport> {
-        match self.store.scene(id).await? {
-            Some(row) => Ok(row.report),
-            None => {
-                let detail = format!("'{id}' was not uploaded: PUT its bytes to /v1/scenes/{id} first");
-                Err(FarmError::Request(vec![fault(pointer, detail)]))
-            }
-        }
+        let row = self.store.scene(id).await?;
+        row.map(|row| row.report).ok_or_else(|| {
+            let detail = format!("'{id}' was not uploaded: PUT its bytes to /v1/scenes/{id} first");
+            FarmError::Request(vec![fault(pointer, detail)])
+        })
     }
 
     /// Takes a job. The same request under the same key is taken once.
@@ -302,7 +300,7 @@ fn warnings(
     if camera == CameraChoice::Framed {
         warnings.push("the scene has no camera: it is framed".to_owned());
     }
-    if samples % replicates != 0 {
+    if !samples.is_multiple_of(replicates) {
         let drawn = samples / replicates * replicates;
         warnings.push(format!(
             "{samples} samples are not a multiple of {replicates} replicates: {drawn} are drawn"

@@ -16,7 +16,7 @@ use ovtigre_proto::{
 };
 use std::{sync::Arc, time::Duration};
 
-const LONG: Duration = Duration::from_secs(60);
+const LONG: Duration = Duration::from_mins(1);
 const NOW: Duration = Duration::ZERO;
 
 fn id<T: std::str::FromStr<Err: std::fmt::Debug>>(text: &str) -> T {

@@ -1,5 +1,7 @@
 //! Why the store did not do something.
 
+use std::fmt::Display;
+
 /// A store that failed. Whether a change was made is told by the variant.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
@@ -27,8 +29,8 @@ pub enum StoreError {
 
 impl StoreError {
     /// A row of kind `what` whose `detail` cannot be understood.
-    pub fn damaged(what: &'static str, detail: impl ToString) -> Self {
-        Self::Damaged { what, detail: detail.to_string() }
+    pub fn damaged(what: &'static str, detail: impl Display) -> Self {
+        Self::Damaged { what, detail: format!("{detail}") }
     }
 }
 

@@ -26,7 +26,8 @@ async fn every_default_is_resolved() {
 async fn a_request_that_cannot_be_followed_is_refused_where_it_is_wrong() {
     let bench = Bench::new(rules()).await;
     let (scene, sky) = (bench.scene().await, bench.upload(b"sky").await);
-    let cases: Vec<(&str, Box<dyn Fn(&mut JobRequest)>)> = vec![
+    type Change<'a> = Box<dyn Fn(&mut JobRequest) + 'a>;
+    let cases: Vec<(&str, Change<'_>)> = vec![
         ("/scene", Box::new(|r| r.scene = None)),
         ("/scene", Box::new(|r| r.scene = Some(ovtigre_proto::id::BlobId::of([9; 32])))),
         ("/scene", Box::new(|r| r.scene = Some(sky.clone()))),
