@@ -109,7 +109,10 @@ impl Drop for Process {
 }
 
 /// A farm, and its address.
-struct Farm(Process, String);
+struct Farm {
+    address: String,
+    _process: Process,
+}
 
 impl Farm {
     fn start(folder: &Path, listen: &str, workers: u32) -> Self {
@@ -118,7 +121,7 @@ impl Farm {
         let mut child = command(folder, &arguments).stderr(Stdio::null()).spawn().unwrap();
         let mut address = String::new();
         BufReader::new(child.stdout.take().unwrap()).read_line(&mut address).unwrap();
-        Self(Process(child), address.trim().to_owned())
+        Self { address: address.trim().to_owned(), _process: Process(child) }
     }
 }
 
@@ -150,7 +153,7 @@ fn one_command_renders_a_scene() {
 fn a_farm_is_asked_from_the_command_line() {
     let folder = scene();
     let farm = Farm::start(folder.path(), "127.0.0.1:0", 1);
-    let ask = |arguments: &str| prints(folder.path(), &format!("{arguments} --server {}", farm.1));
+    let ask = |arguments: &str| prints(folder.path(), &format!("{arguments} --server {}", farm.address));
     let job = ask("submit lamp.gltf --size 16x16 --samples 8").trim().to_owned();
     let watched = ask(&format!("watch {job} --json"));
     let last: Value = serde_json::from_str(watched.lines().last().unwrap()).unwrap();
@@ -171,7 +174,9 @@ fn a_farm_is_asked_from_the_command_line() {
     assert!(ask(&format!("status {endless}")).contains("cancelled"));
     ask("render lamp.gltf --size 16x16 --samples 8 -o there.exr");
     prints(folder.path(), "compare fetched.exr there.exr --tolerance 0");
-    assert!(refusal(folder.path(), &format!("status nobody --server {}", farm.1), 2).contains("nobody"));
+    assert!(
+        refusal(folder.path(), &format!("status nobody --server {}", farm.address), 2).contains("nobody")
+    );
 }
 
 #[test]
@@ -196,7 +201,7 @@ fn killed_workers_and_a_restarted_farm_change_no_bit() {
     let flags = "lamp.gltf --size 96x64 --samples 512";
     prints(folder.path(), &format!("render {flags} --threads 2 -o calm.exr"));
     let farm = Farm::start(folder.path(), "127.0.0.1:0", 0);
-    let address = farm.1.clone();
+    let address = farm.address.clone();
     let ask = |arguments: &str| prints(folder.path(), &format!("{arguments} --server {address}"));
     let job = ask(&format!("submit {flags}")).trim().to_owned();
     let samples = || {
@@ -232,11 +237,11 @@ fn killed_workers_and_a_restarted_farm_change_no_bit() {
 fn a_worker_told_to_leave_leaves_in_peace() {
     let folder = scene();
     let farm = Farm::start(folder.path(), "127.0.0.1:0", 0);
-    let mut worker = Process::worker(folder.path(), &farm.1, "cache");
-    prints(folder.path(), &format!("render lamp.gltf --size 16x16 --samples 8 --server {}", farm.1));
+    let mut worker = Process::worker(folder.path(), &farm.address, "cache");
+    prints(folder.path(), &format!("render lamp.gltf --size 16x16 --samples 8 --server {}", farm.address));
     signal(&worker.0, "TERM");
     assert!(worker.0.wait().unwrap().success());
-    let workers = prints(folder.path(), &format!("workers --server {}", farm.1));
+    let workers = prints(folder.path(), &format!("workers --server {}", farm.address));
     assert!(workers.contains("gone") && !workers.contains("active"), "{workers}");
 }
 
