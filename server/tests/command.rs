@@ -90,24 +90,38 @@ fn signal(child: &Child, name: &str) {
     );
 }
 
-/// A farm with one worker, and its address; ends with this value.
-struct Farm(Child, String);
+/// A process that ends with this value.
+struct Process(Child);
 
-impl Farm {
-    fn start(folder: &Path) -> Self {
-        let mut child =
-            command(folder, "serve --listen 127.0.0.1:0 --data farm --workers 1 --threads 1 --log error");
-        let mut child = child.stderr(Stdio::inherit()).spawn().unwrap();
-        let mut address = String::new();
-        BufReader::new(child.stdout.take().unwrap()).read_line(&mut address).unwrap();
-        Self(child, address.trim().to_owned())
+impl Process {
+    fn worker(folder: &Path, farm: &str, cache: &str) -> Self {
+        let mut command =
+            command(folder, &format!("work --server {farm} --threads 1 --cache {cache} --log error"));
+        Self(command.stderr(Stdio::inherit()).spawn().unwrap())
     }
 }
 
-impl Drop for Farm {
+impl Drop for Process {
     fn drop(&mut self) {
         self.0.kill().ok();
         self.0.wait().ok();
+    }
+}
+
+/// A farm, and its address.
+struct Farm {
+    address: String,
+    _process: Process,
+}
+
+impl Farm {
+    fn start(folder: &Path, listen: &str, workers: u32) -> Self {
+        let arguments =
+            format!("serve --listen {listen} --data farm --workers {workers} --threads 1 --log error");
+        let mut child = command(folder, &arguments).stderr(Stdio::null()).spawn().unwrap();
+        let mut address = String::new();
+        BufReader::new(child.stdout.take().unwrap()).read_line(&mut address).unwrap();
+        Self { address: address.trim().to_owned(), _process: Process(child) }
     }
 }
 
@@ -138,8 +152,8 @@ fn one_command_renders_a_scene() {
 #[test]
 fn a_farm_is_asked_from_the_command_line() {
     let folder = scene();
-    let farm = Farm::start(folder.path());
-    let ask = |arguments: &str| prints(folder.path(), &format!("{arguments} --server {}", farm.1));
+    let farm = Farm::start(folder.path(), "127.0.0.1:0", 1);
+    let ask = |arguments: &str| prints(folder.path(), &format!("{arguments} --server {}", farm.address));
     let job = ask("submit lamp.gltf --size 16x16 --samples 8").trim().to_owned();
     let watched = ask(&format!("watch {job} --json"));
     let last: Value = serde_json::from_str(watched.lines().last().unwrap()).unwrap();
@@ -160,7 +174,9 @@ fn a_farm_is_asked_from_the_command_line() {
     assert!(ask(&format!("status {endless}")).contains("cancelled"));
     ask("render lamp.gltf --size 16x16 --samples 8 -o there.exr");
     prints(folder.path(), "compare fetched.exr there.exr --tolerance 0");
-    assert!(refusal(folder.path(), &format!("status nobody --server {}", farm.1), 2).contains("nobody"));
+    assert!(
+        refusal(folder.path(), &format!("status nobody --server {}", farm.address), 2).contains("nobody")
+    );
 }
 
 #[test]
@@ -177,6 +193,56 @@ fn interrupted_once_it_keeps_the_picture_so_far() {
     assert_eq!(output.status.code(), Some(5), "{remarks}");
     assert!(began.elapsed() < Duration::from_secs(20));
     assert_eq!(picture(&folder.path().join("lamp.exr")).width, 64);
+}
+
+#[test]
+fn killed_workers_and_a_restarted_farm_change_no_bit() {
+    let folder = scene();
+    let flags = "lamp.gltf --size 96x64 --samples 512";
+    prints(folder.path(), &format!("render {flags} --threads 2 -o calm.exr"));
+    let farm = Farm::start(folder.path(), "127.0.0.1:0", 0);
+    let address = farm.address.clone();
+    let ask = |arguments: &str| prints(folder.path(), &format!("{arguments} --server {address}"));
+    let job = ask(&format!("submit {flags}")).trim().to_owned();
+    let samples = || {
+        let status: Value = serde_json::from_str(&ask(&format!("status {job} --json"))).unwrap();
+        status["samples_done"].as_f64().unwrap()
+    };
+    let reaches = |count: f64| {
+        let began = Instant::now();
+        while samples() < count {
+            assert!(began.elapsed() < Duration::from_secs(60), "{} of {count} samples", samples());
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    };
+    let first = Process::worker(folder.path(), &address, "cache-1");
+    reaches(8.0);
+    drop(first);
+    let watching = command(folder.path(), &format!("watch {job} --server {address}")).spawn().unwrap();
+    let _second = Process::worker(folder.path(), &address, "cache-2");
+    reaches(64.0);
+    drop(farm);
+    std::thread::sleep(Duration::from_millis(300));
+    let _again = Farm::start(folder.path(), address.trim_start_matches("http://"), 0);
+    let _third = Process::worker(folder.path(), &address, "cache-2");
+    let watched = watching.wait_with_output().unwrap();
+    assert!(watched.status.success(), "{}", String::from_utf8_lossy(&watched.stderr));
+    ask(&format!("fetch {job} -o stormy.exr"));
+    let (calm, stormy) =
+        (picture(&folder.path().join("calm.exr")), picture(&folder.path().join("stormy.exr")));
+    assert_eq!(calm.channels, stormy.channels);
+}
+
+#[test]
+fn a_worker_told_to_leave_leaves_in_peace() {
+    let folder = scene();
+    let farm = Farm::start(folder.path(), "127.0.0.1:0", 0);
+    let mut worker = Process::worker(folder.path(), &farm.address, "cache");
+    prints(folder.path(), &format!("render lamp.gltf --size 16x16 --samples 8 --server {}", farm.address));
+    signal(&worker.0, "TERM");
+    assert!(worker.0.wait().unwrap().success());
+    let workers = prints(folder.path(), &format!("workers --server {}", farm.address));
+    assert!(workers.contains("gone") && !workers.contains("active"), "{workers}");
 }
 
 #[cfg(target_os = "linux")]

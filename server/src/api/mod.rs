@@ -1,6 +1,7 @@
 //! Doors: HTTP to farm and back, no rules.
 
 pub mod body;
+pub mod carry_out;
 pub mod curve;
 pub mod error;
 pub mod events;
@@ -19,7 +20,7 @@ mod tests;
 
 use crate::farm::Farm;
 use axum::{
-    Router,
+    Router, middleware,
     routing::{get, post, put},
 };
 use std::sync::Arc;
@@ -49,5 +50,6 @@ pub fn router(farm: Arc<Farm>) -> Router {
         .route("/", get(health::page))
         .fallback(error::no_route)
         .method_not_allowed_fallback(error::no_method)
+        .layer(middleware::from_fn(carry_out::carry_out))
         .with_state(farm)
 }
