@@ -107,6 +107,8 @@ CREATE TABLE failure (
     block INTEGER NOT NULL,
     worker TEXT NOT NULL,
     reason TEXT NOT NULL,
+    -- Whether the worker was lost, and said nothing.
+    lost INTEGER NOT NULL,
     failed_ms INTEGER NOT NULL
 ) STRICT;
 

@@ -36,6 +36,19 @@ pub async fn put(
         );
         ApiError::new(StatusCode::BAD_REQUEST, "invalid-hash", "Invalid hash", detail)
     })?;
+    if let Ok(report) = farm.scene(&named).await {
+        // Read, though nothing is kept: a client that is still sending would not hear the answer.
+        let mut pieces = body.into_data_stream();
+        let mut left = farm.rules.scene_bytes;
+        while let Some(Ok(piece)) = pieces.next().await {
+            left = left
+                .checked_sub(piece.len() as u64)
+                .ok_or_else(|| ApiError::too_large(farm.rules.scene_bytes))?;
+        }
+        return Ok(
+            (StatusCode::OK, [(header::LOCATION, route::scene(&report.id))], Json(report)).into_response()
+        );
+    }
     upload(&farm, body, Some(named)).await
 }
 

@@ -4,7 +4,7 @@
 use super::{
     Farm,
     error::{FarmError, Result},
-    live::{Arrival, Live, View},
+    live::{Arrival, Live, View, sum_bytes},
     spec::LAYERS,
     split::lanes,
     stop::can_end,
@@ -108,6 +108,18 @@ impl Merge {
             let before = self.waiting.remove(&batch);
             let sum = arrival.sum.or(before.and_then(|b| b.sum));
             self.waiting.insert(batch, Arrival { row: arrival.row, sum });
+        }
+    }
+
+    /// Keeps at most `bytes` of decoded sums among what waits: the others are read from their blobs
+    /// when their turn comes.
+    fn slim(&mut self, bytes: u64) {
+        let mut kept = 0;
+        for arrival in self.waiting.values_mut() {
+            kept += arrival.sum.as_ref().map_or(0, sum_bytes);
+            if kept > bytes {
+                arrival.sum = None;
+            }
         }
     }
 
@@ -257,6 +269,9 @@ impl Farm {
     pub async fn advance(&self, live: &Arc<Live>) -> Result<bool> {
         let mut held = self.sums(live).await?;
         loop {
+            if self.stopping.is_cancelled() {
+                return Ok(false);
+            }
             let merge = held.as_mut().expect("loaded above");
             live.arrivals().into_iter().for_each(|arrival| merge.add(arrival));
             if let Some(ending) = live.ending()
@@ -276,7 +291,10 @@ impl Farm {
                         return self.finish(live, held, ending).await.map(|()| true);
                     }
                 }
-                Next::Wait => return Ok(false),
+                Next::Wait => {
+                    merge.slim(self.rules.fresh_bytes);
+                    return Ok(false);
+                }
             }
         }
     }
@@ -355,7 +373,7 @@ enum Source {
 impl Source {
     fn bytes(&self) -> u64 {
         match self {
-            Self::Decoded(sum) => super::live::sum_bytes(sum),
+            Self::Decoded(sum) => sum_bytes(sum),
             Self::Partial(bytes) => bytes.len() as u64,
         }
     }

@@ -50,6 +50,9 @@ impl Farm {
             CommitOutcome::First => {
                 self.counters.count(Fate::Accepted);
                 self.book().brought(&job, key);
+                if let Some(worker) = &worker {
+                    self.crew().clear(worker);
+                }
                 self.arrive(&live, row, sum);
                 Ok(Commit::Accepted)
             }

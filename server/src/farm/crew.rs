@@ -6,6 +6,9 @@ use std::{
     time::{Duration, Instant},
 };
 
+/// A rest is doubled so often, at most.
+const STRIKES_MAX: u32 = 6;
+
 /// A worker.
 #[derive(Clone, Copy, Debug)]
 pub struct Member {
@@ -17,6 +20,17 @@ pub struct Member {
     pub noted: Instant,
     /// When it was last heard of.
     pub seen: Instant,
+    /// Batches it gave back with a reason since it brought one.
+    pub strikes: u32,
+    /// It gets no batch before.
+    pub rests_until: Instant,
+}
+
+impl Member {
+    /// One that is heard of for the first time.
+    pub fn new(state: WorkerState, now: Instant) -> Self {
+        Self { state, capacity: 1, noted: now, seen: now, strikes: 0, rests_until: now }
+    }
 }
 
 /// Workers that were heard of.
@@ -41,6 +55,28 @@ impl Crew {
         if let Some(member) = self.members.get_mut(id) {
             member.state = state;
         }
+    }
+
+    /// A worker gave a batch back with a reason: it rests for `time`, twice as long for each batch
+    /// before since it brought one.
+    pub fn strike(&mut self, id: &WorkerId, time: Duration) {
+        if let Some(member) = self.members.get_mut(id) {
+            member.rests_until = Instant::now() + time * (1 << member.strikes.min(STRIKES_MAX));
+            member.strikes += 1;
+        }
+    }
+
+    /// A worker brought a batch.
+    pub fn clear(&mut self, id: &WorkerId) {
+        if let Some(member) = self.members.get_mut(id) {
+            member.strikes = 0;
+            member.rests_until = Instant::now();
+        }
+    }
+
+    /// Whether a worker is to get no batch now.
+    pub fn rests(&self, id: &WorkerId) -> bool {
+        self.members.get(id).is_some_and(|member| member.rests_until > Instant::now())
     }
 
     /// Workers lost or gone.

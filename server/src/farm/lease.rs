@@ -40,9 +40,7 @@ impl Farm {
         let id = self.ids.worker();
         let (name, threads) = (join.name.clone(), join.threads);
         self.store.add_worker(&id, join).await?;
-        let now = Instant::now();
-        let member = Member { state: WorkerState::Active, capacity: 1, noted: now, seen: now };
-        self.crew().set(&id, member);
+        self.crew().set(&id, Member::new(WorkerState::Active, Instant::now()));
         tracing::info!(worker = %id, name, threads, "worker joined");
         Ok(WorkerJoined { id, interval_seconds: self.interval() })
     }
@@ -52,7 +50,9 @@ impl Farm {
         let state = self.hear(worker, &said).await?;
         let drop = self.renew(worker, &said).await?;
         let leases = match state {
-            WorkerState::Active if !said.leaving => self.hand_out(worker, &said).await?,
+            WorkerState::Active if !said.leaving && !self.crew().rests(worker) => {
+                self.hand_out(worker, &said).await?
+            }
             _ => Vec::new(),
         };
         let drain = state != WorkerState::Active;
@@ -84,7 +84,13 @@ impl Farm {
             return Err(FarmError::not_found("worker", id));
         }
         let capacity = said.wants.min(self.rules.wants_max) + said.holding.len() as u32;
-        let member = Member { state, capacity, noted: noted.map_or(now, |m| m.noted), seen: now };
+        let member = Member {
+            state,
+            capacity,
+            noted: noted.map_or(now, |m| m.noted),
+            seen: now,
+            ..known.unwrap_or_else(|| Member::new(state, now))
+        };
         if state == WorkerState::Gone {
             self.crew().remove(id);
         } else {
@@ -190,6 +196,7 @@ impl Farm {
             }
             FailureKind::Worker => {
                 self.counters.count(Fate::Failed);
+                self.crew().strike(&released.lease.worker, self.rules.rest);
                 self.judge(&released, &reason).await
             }
         }
@@ -197,15 +204,19 @@ impl Farm {
 
     /// Fails a job one of whose batches fails again and again.
     pub(super) async fn judge(&self, released: &Released, reason: &str) -> Result<()> {
-        let Released { lease, failures, workers } = released;
-        tracing::warn!(lease = %lease.id, worker = %lease.worker, failures, reason, "a batch came back");
-        if *workers < self.rules.failing_workers && *failures < self.rules.failures {
+        let Released { lease, failures, workers, losses } = released;
+        tracing::warn!(lease = %lease.id, worker = %lease.worker, failures, losses, reason, "a batch came back");
+        let given_back = *workers >= self.rules.failing_workers || *failures >= self.rules.failures;
+        let text = if given_back {
+            format!(
+                "{} failed {failures} times on {workers} workers, the last time because: {reason}",
+                lease.batch
+            )
+        } else if *losses >= self.rules.losses {
+            format!("{} lost its worker {losses} times: it may need more memory than they have", lease.batch)
+        } else {
             return Ok(());
-        }
-        let text = format!(
-            "{} failed {failures} times on {workers} workers, the last time because: {reason}",
-            lease.batch
-        );
+        };
         self.fail(&lease.job, text).await
     }
 }

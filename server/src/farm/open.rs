@@ -89,13 +89,15 @@ impl Farm {
         } else {
             self.hand_out_from(row, &live).await?;
         }
-        live.kick.notify_one();
         self.tasks.spawn(Arc::clone(self).pump(live));
         Ok(())
     }
 
     async fn hand_out_from(&self, row: &JobRow, live: &Live) -> Result<()> {
         let ledger = self.store.ledger(&row.id).await?;
+        if !ledger.commits.is_empty() {
+            live.kick.notify_one();
+        }
         let schedule = Arc::clone(&live.schedule);
         let plan = Plan::new(schedule, ledger.cursors, ledger.returned, ledger.checkpoints);
         let hand_out = if row.state == JobState::Paused { HandOut::Paused } else { HandOut::Yes };

@@ -19,16 +19,23 @@ pub struct Rules {
     pub tick: Duration,
     /// Bytes of sums in memory, of all jobs together; a job that needs more is refused.
     pub sums_bytes: u64,
-    /// Bytes of decoded sums that wait for their append in memory; others wait as blobs.
+    /// Bytes of decoded sums that wait for their append in memory, on their way and in each job;
+    /// others wait as blobs.
     pub fresh_bytes: u64,
     /// A lane's blocks since its last blob of sums, at most: so many partials are kept.
     pub partials_kept: u32,
     /// Batches given to a worker at a time.
     pub wants_max: u32,
-    /// A batch that failed on so many workers fails its job.
+    /// A batch that so many workers gave back with a reason fails its job.
     pub failing_workers: u32,
-    /// A batch that failed so often fails its job, however few the workers.
+    /// A batch that was given back with a reason so often fails its job, however few the workers.
     pub failures: u32,
+    /// A batch whose worker was lost so often fails its job. More than workers that are killed at
+    /// random lose of one batch, so that only a batch that kills them gets there.
+    pub losses: u32,
+    /// A worker that gave a batch back with a reason gets none for so long; twice as long each time
+    /// until it brings one.
+    pub rest: Duration,
     /// Idempotency keys are remembered so long.
     pub keys: Duration,
     /// Largest upload.
@@ -50,6 +57,8 @@ impl Default for Rules {
             wants_max: 64,
             failing_workers: 3,
             failures: 5,
+            losses: 10,
+            rest: Duration::from_secs(1),
             keys: Duration::from_hours(24),
             scene_bytes: 2 << 30,
         }

@@ -287,10 +287,12 @@ pub enum CommitOutcome {
 pub struct Released {
     /// The lease that ended.
     pub lease: LeaseRow,
-    /// Failures of this batch so far.
+    /// How often this batch was given back with a reason so far.
     pub failures: u32,
-    /// Workers that it failed on.
+    /// Workers that did so.
     pub workers: u32,
+    /// How often its worker was lost so far.
+    pub losses: u32,
 }
 
 /// A worker.

@@ -42,7 +42,7 @@ pub(crate) struct Bench {
 
 /// Fast enough for tests, else as always.
 pub(crate) fn rules() -> Rules {
-    Rules { tick: Duration::from_millis(10), ..Rules::default() }
+    Rules { tick: Duration::from_millis(10), rest: Duration::ZERO, ..Rules::default() }
 }
 
 async fn open(folder: &TempDir, rules: Rules) -> Arc<Farm> {

@@ -145,3 +145,48 @@ async fn a_lost_sum_fails_its_job_with_the_reason() {
     let status = bench.until_settled(&job, JobState::Failed).await;
     assert!(status.reason.unwrap().contains("is lost"));
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_worker_that_fails_rests_while_others_work() {
+    let bench = Bench::new(Rules { rest: Duration::from_millis(150), ..rules() }).await;
+    let job = bench.job(1000, |_| ()).await;
+    let (bad, good) = (bench.worker().await, bench.worker().await);
+    let failure = LeaseFailure { reason: "no disk".to_owned(), kind: FailureKind::Worker };
+    let lease = bench.take(&bad, 1).await.remove(0);
+    bench.farm.give_back(&lease.id, failure).await.unwrap();
+    assert!(bench.take(&bad, 1).await.is_empty());
+    assert_eq!(bench.take(&good, 1).await[0].batch, lease.batch);
+    sleep(200).await;
+    let lease = bench.take(&bad, 1).await.remove(0);
+    bench.bring(&lease, Spread::Noisy).await;
+    assert_eq!(bench.take(&bad, 1).await.len(), 1);
+    bench.farm.cancel(&job).await.unwrap();
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_batch_that_kills_its_workers_fails_its_job_in_the_end() {
+    let rules = Rules { lease: Duration::from_millis(20), losses: 4, ..rules() };
+    let bench = Bench::new(rules).await;
+    let job = bench.job(1000, |_| ()).await;
+    for n in 1..=4 {
+        assert!(!bench.farm.status(&job).await.unwrap().state.is_over(), "before {n}");
+        let worker = bench.worker().await;
+        bench.take(&worker, 1).await;
+        sleep(100).await;
+    }
+    let status = bench.until_settled(&job, JobState::Failed).await;
+    assert!(status.reason.unwrap().contains("lost its worker 4 times"));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_worker_goes_on_with_its_lease_when_the_farm_is_back() {
+    let bench = Bench::new(rules()).await;
+    let job = bench.job(1000, |_| ()).await;
+    let worker = bench.worker().await;
+    let lease = bench.take(&worker, 1).await.remove(0);
+    let bench = bench.crash().await;
+    assert!(bench.beat(&worker, &lease).await, "it still has it");
+    assert_eq!(bench.bring(&lease, Spread::Noisy).await, Commit::Accepted);
+    bench.work(&worker, Spread::Noisy).await;
+    bench.until_settled(&job, JobState::Done).await;
+}

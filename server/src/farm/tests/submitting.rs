@@ -22,11 +22,12 @@ async fn every_default_is_resolved() {
     assert_eq!((spec.samples_asked(), spec.warnings.len()), (8, 1), "at most 10, and it is said");
 }
 
+type Change<'a> = Box<dyn Fn(&mut JobRequest) + 'a>;
+
 #[tokio::test]
 async fn a_request_that_cannot_be_followed_is_refused_where_it_is_wrong() {
     let bench = Bench::new(rules()).await;
     let (scene, sky) = (bench.scene().await, bench.upload(b"sky").await);
-    type Change<'a> = Box<dyn Fn(&mut JobRequest) + 'a>;
     let cases: Vec<(&str, Change<'_>)> = vec![
         ("/scene", Box::new(|r| r.scene = None)),
         ("/scene", Box::new(|r| r.scene = Some(ovtigre_proto::id::BlobId::of([9; 32])))),

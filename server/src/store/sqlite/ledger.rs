@@ -157,7 +157,7 @@ pub(super) async fn release(
     let Some(row) = row.bind(id.as_str()).fetch_optional(&mut *db).await? else { return Ok(None) };
     let lease = lease(&row)?;
     let now = now(db).await?;
-    take_back(db, lease, failure, now).await.map(Some)
+    take_back(db, lease, failure.map_or(End::HandedBack, End::Failed), now).await.map(Some)
 }
 
 /// Ends the leases whose time is over.
@@ -166,8 +166,7 @@ pub(super) async fn expire(db: &mut SqliteConnection) -> Result<Vec<Released>> {
     let rows = sqlx::query("SELECT id, job, region, replicate, block, worker FROM lease WHERE ends_ms <= ?");
     let mut ended = Vec::new();
     for row in rows.bind(now).fetch_all(&mut *db).await? {
-        let reason = "its worker was not heard of in time".to_owned();
-        ended.push(take_back(db, lease(&row)?, Some(reason), now).await?);
+        ended.push(take_back(db, lease(&row)?, End::Lost, now).await?);
     }
     Ok(ended)
 }
@@ -181,12 +180,14 @@ pub(super) async fn any_expired(db: &mut SqliteConnection) -> Result<bool> {
         .await?)
 }
 
-async fn take_back(
-    db: &mut SqliteConnection,
-    lease: LeaseRow,
-    failure: Option<String>,
-    now: i64,
-) -> Result<Released> {
+/// How a lease ended without a sum.
+enum End {
+    HandedBack,
+    Failed(String),
+    Lost,
+}
+
+async fn take_back(db: &mut SqliteConnection, lease: LeaseRow, end: End, now: i64) -> Result<Released> {
     let LeaseRow { id, job, batch: BatchKey { block, replicate, region }, worker } = &lease;
     sqlx::query("DELETE FROM lease WHERE id = ?").bind(id.as_str()).execute(&mut *db).await?;
     sqlx::query(
@@ -198,10 +199,15 @@ async fn take_back(
     .bind(block)
     .execute(&mut *db)
     .await?;
-    if let Some(reason) = failure {
+    let failure = match end {
+        End::HandedBack => None,
+        End::Failed(reason) => Some((reason, false)),
+        End::Lost => Some(("its worker was not heard of in time".to_owned(), true)),
+    };
+    if let Some((reason, lost)) = failure {
         sqlx::query(
-            "INSERT INTO failure (job, region, replicate, block, worker, reason, failed_ms)
-             VALUES (?, ?, ?, ?, ?, ?, ?)",
+            "INSERT INTO failure (job, region, replicate, block, worker, reason, lost, failed_ms)
+             VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
         )
         .bind(job.as_str())
         .bind(region)
@@ -209,6 +215,7 @@ async fn take_back(
         .bind(block)
         .bind(worker.as_str())
         .bind(reason)
+        .bind(lost)
         .bind(now)
         .execute(&mut *db)
         .await?;
@@ -217,8 +224,10 @@ async fn take_back(
             .execute(&mut *db)
             .await?;
     }
-    let (failures, workers): (i64, i64) = sqlx::query_as(
-        "SELECT count(*), count(DISTINCT worker) FROM failure
+    let (failures, workers, losses): (i64, i64, i64) = sqlx::query_as(
+        "SELECT count(CASE WHEN lost = 0 THEN 1 END), count(DISTINCT CASE WHEN lost = 0 THEN worker END),
+                count(CASE WHEN lost = 1 THEN 1 END)
+         FROM failure
          WHERE job = ? AND region = ? AND replicate = ? AND block = ?",
     )
     .bind(job.as_str())
@@ -227,7 +236,7 @@ async fn take_back(
     .bind(block)
     .fetch_one(db)
     .await?;
-    Ok(Released { lease, failures: failures as u32, workers: workers as u32 })
+    Ok(Released { lease, failures: failures as u32, workers: workers as u32, losses: losses as u32 })
 }
 
 /// Remembers how far a lane is kept as one blob.
