@@ -168,7 +168,7 @@ fn a_texture_is_where_it_should_be_and_decoded_as_srgb() {
     glb.place(mesh);
     glb.orthographic(Vec3::new(0.0, 0.0, 3.0), Vec3::ZERO, 2.0, 2.0);
     let picture = rendered(&glb.finish(), &settings(2, 2, 2), 1).picture();
-    let grey = 0.502_886_47; // sRGB 188
+    let grey = 0.502_886_5; // sRGB 188
     let expected = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [grey; 3], [0.0, 0.0, 1.0]];
     for (got, expected) in picture.planes[0].iter().zip(expected) {
         for c in 0..3 {
@@ -228,4 +228,25 @@ fn alpha_lets_light_pass_to_the_eye_and_to_the_floor() {
     });
     // 60 % of the light comes down, 60 % of that is seen.
     rendered(&covered, &settings(8, 8, 16), 256).assert_mean(0.36 * lit, 0.003, "covered to 40 %");
+}
+
+#[test]
+fn light_that_glass_has_trapped_ends_and_what_escapes_is_brighter_by_the_index_squared() {
+    // From within a clear cube, a direction whose every component is below the cosine of the critical angle is
+    // totally reflected for ever; any other leaves in the end, with all of its light.
+    for (target, truth) in [(Vec3::ONE, 0.0), (Vec3::new(1.0, 0.1, 0.05), 1.5 * 1.5)] {
+        let mut glb = Glb::new();
+        let clear = glb.material(glass(1.5));
+        let (positions, triangles) = cuboid(Vec3::splat(-1.0), Vec3::ONE);
+        let cube = glb.mesh(&positions, &triangles, clear);
+        glb.place(cube);
+        glb.perspective(Vec3::new(0.1, 0.0, -0.1), target, 10.0);
+        let picture = rendered(&glb.finish(), &in_environment(settings(4, 4, 16), 1.0), 4);
+        if truth > 0.0 {
+            picture.assert_mean(truth, 0.002, "what escapes");
+        } else {
+            let (mean, _) = picture.mean();
+            assert_eq!(mean, 0.0, "what is trapped");
+        }
+    }
 }

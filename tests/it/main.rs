@@ -1,5 +1,7 @@
 //! All integration tests, one binary.
 
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on panics")]
+
 mod bad_input;
 mod closed_forms;
 mod faults;

@@ -26,7 +26,7 @@ impl Glb {
 
     /// Adds bytes as a buffer view.
     pub fn view(&mut self, bytes: &[u8]) -> usize {
-        while self.bin.len() % 4 != 0 {
+        while !self.bin.len().is_multiple_of(4) {
             self.bin.push(0);
         }
         let offset = self.bin.len();
@@ -89,7 +89,7 @@ impl Glb {
         material: usize,
         attributes: &[(&str, &[f32], usize)],
     ) -> usize {
-        let flat: Vec<f32> = positions.iter().flat_map(|p| p.to_array()).collect();
+        let flat: Vec<f32> = positions.iter().flat_map(Vec3::to_array).collect();
         let mut named = json!({"POSITION": self.floats(&flat, 3)});
         for (name, values, width) in attributes {
             named[*name] = json!(self.floats(values, *width));
@@ -133,7 +133,7 @@ impl Glb {
         let right = if back.y.abs() > 0.999 { Vec3::X } else { Vec3::Y.cross(back).normalize() };
         let up = back.cross(right);
         let columns = [right.extend(0.0), up.extend(0.0), back.extend(0.0), eye.extend(1.0)];
-        let matrix: Vec<f32> = columns.iter().flat_map(|c| c.to_array()).collect();
+        let matrix: Vec<f32> = columns.iter().flat_map(glam::Vec4::to_array).collect();
         self.node(json!({"camera": camera, "matrix": matrix}));
     }
 

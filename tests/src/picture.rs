@@ -29,9 +29,10 @@ pub fn settings(width: u32, height: u32, replicates: u32) -> Settings {
 }
 
 /// The same settings in a uniform environment.
-pub fn in_environment(settings: Settings, radiance: f32) -> Settings {
+pub fn in_environment(mut settings: Settings, radiance: f32) -> Settings {
     let source = EnvironmentSource::Uniform([radiance; 3]);
-    Settings { environment: Some(Environment { source, rotation_degrees: 0.0 }), ..settings }
+    settings.environment = Some(Environment { source, rotation_degrees: 0.0 });
+    settings
 }
 
 /// A scene's trees and lights.

@@ -44,6 +44,9 @@ impl Drop for Process {
     }
 }
 
+/// Longest wait for a job.
+const PATIENCE: Duration = Duration::from_mins(2);
+
 /// A farm that listens on a free port of the loopback.
 #[derive(Debug)]
 pub struct Farm {
@@ -107,7 +110,7 @@ impl Farm {
             if reached(&job) {
                 return job;
             }
-            assert!(start.elapsed() < Duration::from_secs(120), "still {job}");
+            assert!(start.elapsed() < PATIENCE, "still {job}");
             std::thread::sleep(Duration::from_millis(50));
         }
     }

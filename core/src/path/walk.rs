@@ -16,6 +16,12 @@ use glam::Vec3;
 /// 9 on: a Cornell box 70, 51, 50; a hall with many lamps 26, 25, 26; a textured helmet 24, 12, 13.
 const ROULETTE_FROM: u32 = 5;
 
+/// Scatterings from which on a walk is also ended with probability 2 / n at its n-th: a walk that clear glass has trapped
+/// by total reflection loses nothing and would never end. The chance to reach n falls as n⁻², so a trapped walk ends after
+/// about twice this number on average, and the variance stays finite for every albedo below one, which a constant
+/// probability does not achieve.
+const LONG: u32 = 2048;
+
 /// What of a walk depends on the settings.
 #[derive(Clone, Copy, Debug)]
 pub struct WalkRules {
@@ -127,7 +133,10 @@ impl Walk<'_> {
         self.eta_squared *= eta * eta;
         self.scatterings += 1;
         if self.scatterings >= ROULETTE_FROM {
-            let survival = (self.throughput.max_element() * self.eta_squared).min(1.0);
+            let mut survival = (self.throughput.max_element() * self.eta_squared).min(1.0);
+            if self.scatterings >= LONG {
+                survival *= 1.0 - 2.0 / self.scatterings as f32;
+            }
             if choice.y >= survival {
                 return false;
             }

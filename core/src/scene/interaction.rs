@@ -101,7 +101,8 @@ fn place(placement: &Placement, corners: [Vec3; 3], weights: Vec3) -> (Vec3, Vec
                 |v: Vec3| Vec3::from(m.x_axis.abs() * v.x + m.y_axis.abs() * v.y + m.z_axis.abs() * v.z);
             let translation = Vec3::from(moved.to_world.translation).abs();
             let rounding = (absolute(position.abs()) + translation) * gamma(3.0);
-            (moved.to_world.transform_point3(position), absolute(error) * (1.0 + gamma(3.0)) + rounding)
+            let error = absolute(error) * (1.0 + gamma(3.0)) + rounding;
+            (moved.to_world.transform_point3(position), Vec3::splat(error.max_element()))
         }
     }
 }
