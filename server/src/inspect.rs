@@ -10,6 +10,7 @@ use ovtigre_proto::{
     problem::Fault,
     scene::{LightCounts, SceneContent, SceneContents, SceneWarning},
 };
+use std::sync::Arc;
 
 const EXR: &[u8] = &[0x76, 0x2f, 0x31, 0x01];
 const RADIANCE: &[u8] = b"#?";
@@ -22,7 +23,7 @@ pub fn inspect(limits: Limits) -> Inspect {
             let (width, height) = environment.size();
             return Ok(SceneContent::Environment { width: width as u32, height: height as u32 });
         }
-        let found = look(bytes.to_vec(), &limits).map_err(|e| at_fault(&e))?;
+        let found = look(Arc::<[u8]>::from(&bytes[..]), &limits).map_err(|e| at_fault(&e))?;
         Ok(SceneContent::Scene(contents(found)))
     })
 }

@@ -149,7 +149,9 @@ async fn every_error_is_a_problem_document() {
     let doors = Doors::open().await;
     let json = ("content-type", "application/json");
     doors.get("/v1/nothing").await.problem(404, "not-found");
-    doors.send(Method::DELETE, "/v1/jobs", &[], "").await.problem(405, "method-not-allowed");
+    let wrong = doors.send(Method::DELETE, "/v1/jobs", &[], "").await;
+    wrong.problem(405, "method-not-allowed");
+    assert!(wrong.head("allow").contains("GET") && wrong.head("allow").contains("POST"));
     doors.get("/v1/jobs/none").await.problem(404, "not-found");
     doors.get("/v1/jobs/..%2f..").await.problem(404, "not-found");
     doors.get("/v1/jobs/none/image.exr").await.problem(404, "not-found");

@@ -209,8 +209,9 @@ impl Store for Sqlite {
     }
 
     async fn close(&self) {
-        self.writer.close().await;
+        // The writer last: whoever is last folds the log into the file, and readers may not.
         self.readers.close().await;
+        self.writer.close().await;
     }
 }
 
@@ -247,6 +248,7 @@ mod tests {
         };
         store.add_worker(&id, join).await.unwrap();
         store.close().await;
+        assert!(!folder.path().join("farm.sqlite-wal").exists(), "the log is folded into the file");
         assert!(matches!(store.see_worker(&id, WorkerState::Active).await, Err(StoreError::Closed)));
         assert!(matches!(store.worker(&id).await, Err(StoreError::Closed)));
         let again = Sqlite::open(&file).await.unwrap();
