@@ -34,8 +34,8 @@ pub enum ExrError {
     #[error("channel '{0}' is missing, or is not 32-bit float of the region's size")]
     Channel(String),
     /// A value that no sum can have.
-    #[error("{value} in channel '{channel}': sums are finite")]
-    NotFinite {
+    #[error("{value} in channel '{channel}': sums are finite and not negative")]
+    NoSum {
         /// Which channel.
         channel: String,
         /// Which value.
@@ -180,8 +180,8 @@ fn sum_plane(layers: &Layers, prefix: &str) -> Result<Plane, ExrError> {
         let values = layers.channels.get(&name).filter(|v| v.len() == pixels);
         let values = values.ok_or_else(|| ExrError::Channel(name.clone()))?;
         for (pixel, &value) in plane.iter_mut().zip(values) {
-            if !value.is_finite() {
-                return Err(ExrError::NotFinite { channel: name, value });
+            if !(value >= 0.0 && value.is_finite()) {
+                return Err(ExrError::NoSum { channel: name, value });
             }
             pixel[c] = value;
         }
@@ -365,6 +365,6 @@ mod tests {
         let mut nan = sum();
         nan.planes[1][4][2] = f32::NAN;
         let bytes = write_partial(&nan, Size { width: 8, height: 4 }, &attributes());
-        assert!(matches!(read_partial(&bytes, 6), Err(ExrError::NotFinite { .. })));
+        assert!(matches!(read_partial(&bytes, 6), Err(ExrError::NoSum { .. })));
     }
 }

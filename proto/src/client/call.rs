@@ -44,7 +44,7 @@ impl Payload {
 }
 
 /// Time a call without a body may take until its answer begins.
-const PATIENCE: Duration = Duration::from_secs(30);
+const PATIENCE: Duration = Duration::from_secs(10);
 /// Slowest line that uploads are not given up on, in bytes a second.
 const SLOWEST_UPLOAD: f64 = 50_000.0;
 

@@ -104,7 +104,7 @@ impl Client {
             }
         };
         match tokio::time::timeout(call.patience(), request.send()).await {
-            Err(_) => Err(self.unreachable("no answer in time".to_owned(), call.repeat == Repeat::Harmless)),
+            Err(_) => Err(self.unreachable("no answer in time".to_owned(), false)),
             Ok(Err(e)) => {
                 Err(self.unreachable(innermost(&e), e.is_connect() || call.repeat == Repeat::Harmless))
             }

@@ -9,7 +9,7 @@ use super::{
 use crate::farm::{Farm, scene::Novelty};
 use axum::{
     Json,
-    body::Body,
+    body::{Body, HttpBody as _},
     extract::{Path, State},
     http::{HeaderMap, StatusCode, header},
     response::{IntoResponse as _, Response},
@@ -53,6 +53,9 @@ pub async fn put(
 }
 
 async fn upload(farm: &Farm, body: Body, named: Option<BlobId>) -> Result<Response> {
+    if body.size_hint().lower() > farm.rules.scene_bytes {
+        return Err(ApiError::too_large(farm.rules.scene_bytes));
+    }
     let mut incoming = farm.receive().await?;
     let mut pieces = body.into_data_stream();
     while let Some(piece) = pieces.next().await {

@@ -3,7 +3,7 @@
 use super::{
     exit::{CommandError, Outcome},
     farm_flags::FarmFlags,
-    output::{self, Kind, folder_of, kind},
+    output::{self, Kind, check_writable, kind},
     terminal,
 };
 use clap::Args;
@@ -44,7 +44,7 @@ impl Fetch {
     pub(crate) async fn run(self) -> Outcome {
         let client = self.farm.client()?;
         let file = self.output.unwrap_or_else(|| format!("{}.exr", self.job).into());
-        folder_of(&file)?;
+        check_writable(&file)?;
         let development = Development { layer: self.layer, exposure: self.exposure, width: self.width };
         let answer = match kind(&file)? {
             Kind::Png => client.developed(&self.job, &development).await?,

@@ -18,6 +18,7 @@ use std::path::PathBuf;
 
 /// The flags of `render` and `submit`.
 #[derive(Args, Clone, Debug)]
+#[command(allow_negative_numbers = true)]
 pub(crate) struct JobFlags {
     /// Picture to write [default: the scene's name with .exr]; .png also writes a developed picture.
     #[arg(short, long, value_name = "FILE.exr")]

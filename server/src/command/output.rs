@@ -27,13 +27,14 @@ impl Output {
             let stem = scene.file_stem().unwrap_or(scene.as_os_str());
             let mut name = stem.to_owned();
             name.push(".exr");
+            check_writable(Path::new(&name))?;
             return Ok(Self { exr: name.into(), png: None });
         };
         let output = match kind(path)? {
             Kind::Exr => Self { exr: path.to_owned(), png: None },
             Kind::Png => Self { exr: path.with_extension("exr"), png: Some(path.to_owned()) },
         };
-        folder_of(path)?;
+        check_writable(path)?;
         Ok(output)
     }
 
@@ -63,13 +64,20 @@ pub(crate) fn kind(path: &Path) -> Outcome<Kind> {
     }
 }
 
-/// The folder that a file goes to; a missing one is said before hours are spent.
-pub(crate) fn folder_of(path: &Path) -> Outcome<&Path> {
+/// Says before hours are spent that a file cannot be written.
+pub(crate) fn check_writable(path: &Path) -> Outcome {
+    part_of(path).map(drop)
+}
+
+/// The folder that a file goes to.
+fn folder_of(path: &Path) -> Outcome<&Path> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    if folder.is_dir() && !path.is_dir() {
-        return Ok(folder);
-    }
-    Err(CommandError::wrong(format!("cannot write {}: there is no such folder", path.display())))
+    let reason = match (folder.is_dir(), path.is_dir()) {
+        (true, false) => return Ok(folder),
+        (true, true) => "it is a folder",
+        (false, _) => "there is no such folder",
+    };
+    Err(CommandError::wrong(format!("cannot write {}: {reason}", path.display())))
 }
 
 /// Writes an answer's body to `path`, over what is there, at its end.

@@ -3,7 +3,7 @@
 use super::{
     exit::{CommandError, Outcome},
     job_flags::JobFlags,
-    output::{Output, folder_of},
+    output::{Output, check_writable},
     report, scene_file, terminal, words,
 };
 use ovtigre_proto::{
@@ -39,7 +39,7 @@ impl Submission {
     pub(crate) async fn read(scene: &Path, flags: JobFlags) -> Outcome<Self> {
         let output = Output::new(flags.output.as_deref(), scene)?;
         if let Some(report) = &flags.report {
-            folder_of(report)?;
+            check_writable(report)?;
         }
         let environment = match &flags.environment {
             None => None,

@@ -240,7 +240,11 @@ fn camera(request: &JobRequest, scene: &SceneContents) -> std::result::Result<Ca
         None if scene.cameras.is_empty() => Err(format!(
             "the scene has no camera '{wanted}', and no other: leave 'camera' out to have it framed"
         )),
-        None => Err(format!("the scene has no camera '{wanted}', but: {}", scene.cameras.join(", "))),
+        None => {
+            let list: Vec<String> =
+                scene.cameras.iter().enumerate().map(|(n, name)| format!("{n} '{name}'")).collect();
+            Err(format!("the scene has no camera '{wanted}'; it has {}", list.join(", ")))
+        }
     }
 }
 
