@@ -19,7 +19,7 @@ pub const WIDTH_DEFAULT: u32 = 1280;
 
 /// What is asked for; what is left out gets its default when the job is submitted.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[serde(deny_unknown_fields, default, expecting = "an object with a job's settings")]
 pub struct JobRequest {
     /// The uploaded scene; required.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -129,7 +129,7 @@ pub enum WeightsRequest {
 
 /// A change to a job; what is left out stays.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[serde(deny_unknown_fields, default, expecting = "an object with what is to change")]
 pub struct JobPatch {
     /// Higher goes first.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -4,7 +4,7 @@ use ovtigre_core::film::size::{Region, Size};
 use serde::{Deserialize, Deserializer, Serializer, de::Error as _};
 
 #[derive(Deserialize)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "expected a text as on the command line, a list of whole numbers, or an object")]
 enum Written<T> {
     Text(String),
     List(Vec<u32>),
@@ -68,7 +68,7 @@ fn join(numbers: &[u32], between: &str) -> String {
 /// A camera's name or number, from text or a number.
 pub fn name_or_number<'de, D: Deserializer<'de>>(from: D) -> Result<Option<String>, D::Error> {
     #[derive(Deserialize)]
-    #[serde(untagged)]
+    #[serde(untagged, expecting = "expected a camera's name, or its number from 0")]
     enum Given {
         Number(u32),
         Name(String),
@@ -92,7 +92,10 @@ pub enum EnvironmentRequest {
 impl<'de> Deserialize<'de> for EnvironmentRequest {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
         #[derive(Deserialize)]
-        #[serde(untagged)]
+        #[serde(
+            untagged,
+            expecting = "expected a radiance R,G,B (a text or three numbers) or the hash of an uploaded image"
+        )]
         enum Given {
             List([f32; 3]),
             Text(String),
