@@ -4,7 +4,10 @@ use ovtigre_core::film::size::{Region, Size};
 use serde::{Deserialize, Deserializer, Serializer, de::Error as _};
 
 #[derive(Deserialize)]
-#[serde(untagged, expecting = "expected a text as on the command line, a list of whole numbers, or an object")]
+#[serde(
+    untagged,
+    expecting = "expected a text as on the command line, a list of whole numbers, or an object"
+)]
 enum Written<T> {
     Text(String),
     List(Vec<u32>),
