@@ -226,7 +226,8 @@ fn alpha_lets_light_pass_to_the_eye_and_to_the_floor() {
             json!({"rotation": [-half, 0.0, 0.0, half]}),
         );
     });
-    // 60 % of the light comes down, 60 % of that is seen.
+    // 60 % of the light comes down, 60 % of that is seen. The sheet's diagonal is kept away from the point that is seen:
+    // a ray on it meets both triangles, and 1.7 % of the light is lost (ARCHITECTURE.md, "Known defects").
     rendered(&covered, &settings(8, 8, 16), 256).assert_mean(0.36 * lit, 0.003, "covered to 40 %");
 }
 
@@ -234,6 +235,8 @@ fn alpha_lets_light_pass_to_the_eye_and_to_the_floor() {
 fn light_that_glass_has_trapped_ends_and_what_escapes_is_brighter_by_the_index_squared() {
     // From within a clear cube, a direction whose every component is below the cosine of the critical angle is
     // totally reflected for ever; any other leaves in the end, with all of its light.
+    // Known defect: this holds at 4×4 pixels and 4 samples, not in general. At 8×8 and 16 samples the trapped mean is
+    // 0.00129 instead of 0 (ARCHITECTURE.md, "Known defects"); the size here says nothing about longer runs.
     for (target, truth) in [(Vec3::ONE, 0.0), (Vec3::new(1.0, 0.1, 0.05), 1.5 * 1.5)] {
         let mut glb = Glb::new();
         let clear = glb.material(glass(1.5));
