@@ -3,6 +3,9 @@
 use crate::film::size::Size;
 use serde::{Deserialize, Serialize};
 
+/// The whole rendering equation.
+pub const FULL: &str = "L(D|S)*E";
+
 /// Settings of a render, every default resolved. The same settings give the same bits.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -13,10 +16,22 @@ pub struct Settings {
     pub camera: CameraChoice,
     /// How light is estimated.
     pub method: Method,
+    /// Which paths the picture shows: a path expression.
+    pub paths: String,
+    /// Further pictures, in their order among a sum's planes.
+    pub layers: Vec<Layer>,
+    /// How gloss is taken after the first scattering.
+    pub gloss: Gloss,
+    /// The techniques of `bidirectional` that are used; empty for all.
+    pub strategies: Vec<Strategy>,
+    /// How the techniques of a path are weighed against each other.
+    pub weights: Weights,
     /// Longest path in scattering events; `None` for no limit.
     pub bounces: Option<u32>,
     /// Lens and focus; `None` for a pinhole.
     pub lens: Option<Lens>,
+    /// When light is let in.
+    pub shutter: Shutter,
     /// Light from infinitely far instead of the scene's own; `None` to leave it as it is.
     pub environment: Option<Environment>,
     /// Whether direct light is blocked.
@@ -43,6 +58,14 @@ pub enum CameraChoice {
 pub enum Method {
     /// Paths from the eye, with next event.
     Path,
+    /// Paths from the lights, with next event to the lens.
+    Light,
+    /// Both, joined everywhere.
+    Bidirectional,
+    /// Paths from the eye to a map of photons.
+    Photon,
+    /// Finite elements, for diffuse paths.
+    Radiosity,
 }
 
 impl Method {
@@ -50,8 +73,75 @@ impl Method {
     pub fn name(self) -> &'static str {
         match self {
             Self::Path => "path",
+            Self::Light => "light",
+            Self::Bidirectional => "bidirectional",
+            Self::Photon => "photon",
+            Self::Radiosity => "radiosity",
         }
     }
+}
+
+/// A further picture.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Layer {
+    /// Its name in a picture's channels.
+    pub name: String,
+    /// What it shows.
+    pub shows: Shows,
+}
+
+/// What a layer shows.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Shows {
+    /// The paths of an expression.
+    Paths(String),
+    /// What one technique of `bidirectional` adds to the picture, weight included.
+    Strategy(Strategy),
+}
+
+/// A technique: how many vertices of a path come from the light, and how many from the eye, light and lens included.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct Strategy {
+    /// Vertices of the light subpath.
+    pub s: u32,
+    /// Vertices of the eye subpath.
+    pub t: u32,
+}
+
+/// How the techniques of a path are weighed against each other.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Weights {
+    /// In proportion to their densities.
+    #[default]
+    Balance,
+    /// In proportion to the squares of their densities.
+    Power,
+    /// All that can make the path alike.
+    Uniform,
+    /// Not at all: every technique counts in full.
+    Single,
+}
+
+/// How gloss is taken after the first scattering from the light.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Gloss {
+    /// As it is.
+    #[default]
+    AsItIs,
+    /// As a mirror's (Whitted).
+    Mirror,
+}
+
+/// When light is let in: seconds of the scene's animation.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Shutter {
+    /// Opens.
+    pub open: f64,
+    /// Closes; not before it opens.
+    pub close: f64,
 }
 
 /// A thin lens.

@@ -10,7 +10,10 @@ use ovtigre_core::{
     },
     render::{batch::render, prepare::prepare, progress::Progress},
     scene::Scene,
-    settings::{CameraChoice, Environment, EnvironmentSource, Method, Settings, Shadows},
+    settings::{
+        CameraChoice, Environment, EnvironmentSource, FULL, Gloss, Method, Settings, Shadows, Shutter,
+        Weights,
+    },
 };
 
 /// Settings with nothing special.
@@ -19,8 +22,14 @@ pub fn settings(width: u32, height: u32, replicates: u32) -> Settings {
         size: Size { width, height },
         camera: CameraChoice::Index(0),
         method: Method::Path,
+        paths: FULL.to_owned(),
+        layers: Vec::new(),
+        gloss: Gloss::AsItIs,
+        strategies: Vec::new(),
+        weights: Weights::Balance,
         bounces: None,
         lens: None,
+        shutter: Shutter::default(),
         environment: None,
         shadows: Shadows::On,
         seed: 0,

@@ -17,7 +17,7 @@ use ovtigre_core::{
         sum::Sum,
     },
     render::progress::Progress,
-    settings::{CameraChoice, Method, Settings, Shadows},
+    settings::{CameraChoice, FULL, Gloss, Method, Settings, Shadows, Shutter, Weights},
 };
 use ovtigre_proto::{
     client::farm::Client,
@@ -39,8 +39,14 @@ pub(crate) fn settings() -> Settings {
         size: Size { width: 2, height: 1 },
         camera: CameraChoice::Framed,
         method: Method::Path,
+        paths: FULL.to_owned(),
+        layers: Vec::new(),
+        gloss: Gloss::AsItIs,
+        strategies: Vec::new(),
+        weights: Weights::Balance,
         bounces: None,
         lens: None,
+        shutter: Shutter::default(),
         environment: None,
         shadows: Shadows::On,
         seed: 0,

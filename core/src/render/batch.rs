@@ -70,6 +70,7 @@ fn render_tile(
                 let sampler = Sampler::new(settings.seed, batch.replicate, [x, y], index);
                 let value = match settings.method {
                     Method::Path => path::sample(scene, settings, [x, y], &sampler, &mut tile.rays),
+                    other => unreachable!("{} is refused when a job is submitted", other.name()),
                 };
                 sum += tile.invalid.checked(value).as_dvec3();
             }

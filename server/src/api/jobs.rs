@@ -51,9 +51,9 @@ impl From<JobSpec> for DryRun {
             samples_asked: spec.samples_asked(),
             batches_asked: spec.schedule().batches(),
             method: spec.settings.method.name(),
+            paths: spec.settings.paths.clone(),
             settings: spec.settings,
             method_reason: spec.method_reason,
-            paths: spec.paths,
             warnings: spec.warnings,
         }
     }

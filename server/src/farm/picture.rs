@@ -220,7 +220,7 @@ fn attributes(row: &JobRow, live: &Live, progress: Progress, manifest: String) -
         samples: progress.samples,
         seed: live.spec.settings.seed,
         method: live.spec.settings.method.name().to_owned(),
-        paths: live.spec.paths.clone(),
+        paths: live.spec.settings.paths.clone(),
         manifest,
         render_seconds: progress.worker_micros as f64 * 1e-6,
         software: SOFTWARE.to_owned(),

@@ -25,8 +25,6 @@ pub struct JobSpec {
     pub error_target: Option<f64>,
     /// Seconds of run time to stop after.
     pub seconds: Option<f64>,
-    /// The path expression.
-    pub paths: String,
     /// Why the method was chosen.
     pub method_reason: String,
     /// What the scene lacked or could not be read, and what was done about it.

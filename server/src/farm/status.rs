@@ -83,7 +83,7 @@ impl Farm {
             eta_seconds,
             method: spec.settings.method.name().to_owned(),
             method_reason: spec.method_reason,
-            paths: spec.paths,
+            paths: spec.settings.paths.clone(),
             settings: spec.settings,
             region: spec.region,
             request: spec.request,

@@ -9,7 +9,9 @@ use super::{
 use crate::store::row::{Added, IdempotencyKey, NewJob};
 use ovtigre_core::{
     film::size::{Region, Size},
-    settings::{CameraChoice, Environment, EnvironmentSource, Lens, Method, Settings},
+    settings::{
+        CameraChoice, Environment, EnvironmentSource, FULL, Gloss, Lens, Method, Settings, Shutter, Weights,
+    },
 };
 use ovtigre_proto::{
     id::BlobId,
@@ -21,8 +23,6 @@ use ovtigre_proto::{
 };
 use std::sync::Arc;
 
-/// The only path expression of this version: the whole rendering equation.
-const FULL: &str = "L(D|S)*E";
 /// Samples a pixel of a job, at most.
 const SAMPLES_MAX: u32 = 1 << 22;
 /// Replicates of a job, at most.
@@ -146,8 +146,14 @@ pub fn resolve(
             size,
             camera,
             method: Method::Path,
+            paths: FULL.to_owned(),
+            layers: Vec::new(),
+            gloss: Gloss::AsItIs,
+            strategies: Vec::new(),
+            weights: Weights::Balance,
             bounces: request.bounces,
             lens,
+            shutter: Shutter::default(),
             environment: environment(&request),
             shadows: request.shadows.unwrap_or_default(),
             seed: request.seed.unwrap_or(0),
@@ -157,7 +163,6 @@ pub fn resolve(
         samples: samples / replicates,
         error_target: request.error,
         seconds: request.seconds,
-        paths: FULL.to_owned(),
         method_reason: match request.method {
             Some(MethodRequest::Path) => "asked for".to_owned(),
             _ => "samples the whole rendering equation from the eye, with next event".to_owned(),
