@@ -31,7 +31,7 @@ pub fn next_event(
     let choice = sampler.pair(Dimension::Eye(scattering, Use::Light)).x;
     let place = sampler.pair(Dimension::Eye(scattering, Use::LightPoint));
     let point = vertex.at.position;
-    let Some(event) = scene.lights.sample(&scene.data, scene.environment.as_ref(), point, choice, place)
+    let Some((_, event)) = scene.lights.sample(&scene.data, scene.environment.as_ref(), point, choice, place)
     else {
         return Vec3::ZERO;
     };
