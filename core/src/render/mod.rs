@@ -5,3 +5,6 @@ pub mod inspect;
 pub mod prepare;
 pub mod profile;
 pub mod progress;
+mod sample;
+mod splats;
+mod tile;

@@ -144,6 +144,24 @@ impl Lights {
         }
     }
 
+    /// Density over solid angle at `point` of next events towards `at`, a point of the light of a number, seen in
+    /// `direction`; zero for a light without extent.
+    pub fn light_pdf(
+        &self,
+        data: &SceneData,
+        light: u32,
+        point: Vec3,
+        at: &Interaction<'_>,
+        direction: Vec3,
+    ) -> f32 {
+        match *self.light(light) {
+            Light::Triangle { instance, triangle } => {
+                self.triangle_pdf(data, (instance, triangle), point, at, direction)
+            }
+            _ => 0.0,
+        }
+    }
+
     /// Density over solid angle of next events in `direction` towards the environment.
     pub fn environment_pdf(&self, environment: &Environment, direction: Vec3) -> f32 {
         self.environment.map_or(0.0, |light| environment.pdf(direction) * self.probability(light))
