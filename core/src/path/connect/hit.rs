@@ -5,6 +5,7 @@ use crate::path::connect::light_vertex::LightStart;
 use crate::path::connect::whole::{Joint, whole};
 use crate::path::expression::language::{EyeState, LightState};
 use crate::path::mis::exhaustive::Link;
+use crate::path::mis::recursive;
 use crate::path::rules::Weighing;
 use crate::path::tally::{Receiver, Tally};
 use crate::path::throughput::Throughput;
@@ -94,7 +95,6 @@ fn deposit<S: Throughput<EyeState>, L: Throughput<LightState>>(
 }
 
 fn weight<S: Throughput<EyeState>>(walk: &Walk<'_, EyeState, S>, hit: &Hit) -> f64 {
-    let partial = walk.partial;
     match &walk.rules.weighing {
         // Next events that nothing blocks have found all of it.
         Weighing::FromEye if walk.rules.shadows == Shadows::Off && walk.edge.density != Density::Delta => {
@@ -104,11 +104,11 @@ fn weight<S: Throughput<EyeState>>(walk: &Walk<'_, EyeState, S>, hit: &Hit) -> f
                 0.0
             }
         }
-        Weighing::FromEye => 1.0 / (1.0 + hit.next_event * partial.near),
+        Weighing::FromEye => 1.0 / (1.0 + hit.next_event * walk.partial.near),
         Weighing::ToLens => 0.0,
         Weighing::All(h) => {
             let emitted = f64::from(hit.emission.origin) * f64::from(hit.emission.emission);
-            1.0 / (1.0 + h.of(hit.next_event) * partial.near + h.of(emitted) * partial.far)
+            recursive::hit(*h, &walk.partial, hit.next_event, emitted)
         }
         Weighing::Chosen(chosen) => {
             let joint = Joint {

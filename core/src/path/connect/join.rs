@@ -6,6 +6,7 @@ use crate::path::connect::light_vertex::LightVertex;
 use crate::path::connect::unblocked;
 use crate::path::connect::whole::{Joint, whole};
 use crate::path::expression::language::{EyeState, LightState};
+use crate::path::mis::recursive::{self, Bridge};
 use crate::path::rules::Weighing;
 use crate::path::tally::{Receiver, Tally};
 use crate::path::throughput::Throughput;
@@ -14,7 +15,7 @@ use crate::path::walk::Walk;
 use glam::Vec3;
 
 /// The edge between two vertices.
-struct Bridge {
+struct Between {
     /// From the eye's vertex to the light's.
     direction: Vec3,
     squared: f64,
@@ -54,8 +55,8 @@ pub fn join<S: Throughput<EyeState>, L: Throughput<LightState>>(
         return;
     }
     let squared = f64::from(towards.length_squared());
-    let bridge = Bridge { direction, squared, pdfs: [forward, backward] };
-    let weight = weight(walk, vertex, light, &bridge);
+    let between = Between { direction, squared, pdfs: [forward, backward] };
+    let weight = weight(walk, vertex, light, &between);
     // Cosines are in the values.
     let factor = passes * (weight / squared) as f32;
     tally.deposit(rules, Receiver::Own, technique, &eye, &from_light, factor);
@@ -65,27 +66,25 @@ fn weight<S: Throughput<EyeState>, L>(
     walk: &Walk<'_, EyeState, S>,
     vertex: &Vertex<'_>,
     light: &LightVertex<'_, L>,
-    bridge: &Bridge,
+    between: &Between,
 ) -> f64 {
-    let [forward, backward] = bridge.pdfs.map(f64::from);
-    // Over area, at the vertex that the other one would make.
-    let onto_light = forward * f64::from(light.vertex.cos(bridge.direction)) / bridge.squared;
-    let onto_eye = backward * f64::from(vertex.cos(bridge.direction)) / bridge.squared;
-    let eye_reverse = f64::from(vertex.reverse_pdf(bridge.direction));
-    let light_reverse = f64::from(light.vertex.reverse_pdf(-bridge.direction));
+    let Between { direction, squared, pdfs } = *between;
+    let [forward, backward] = pdfs.map(f64::from);
+    let bridge = Bridge {
+        onto_light: forward * f64::from(light.vertex.cos(direction)) / squared,
+        light_reverse: f64::from(light.vertex.reverse_pdf(-direction)),
+        onto_eye: backward * f64::from(vertex.cos(direction)) / squared,
+        eye_reverse: f64::from(vertex.reverse_pdf(direction)),
+    };
     match &walk.rules.weighing {
         Weighing::FromEye | Weighing::ToLens => 0.0,
-        Weighing::All(h) => {
-            let shorter = light.partial.behind(*h, onto_light, light_reverse);
-            let longer = walk.partial.behind(*h, onto_eye, eye_reverse);
-            1.0 / (shorter + 1.0 + longer)
-        }
+        Weighing::All(h) => recursive::join(*h, &light.partial, &walk.partial, &bridge),
         Weighing::Chosen(chosen) => {
             let joint = Joint {
-                eye_end: onto_eye,
-                before_eye_end: eye_reverse * walk.links.last().map_or(0.0, |link| link.jacobian),
-                light_end: onto_light,
-                before_light_end: light_reverse * light.links.last().map_or(0.0, |link| link.jacobian),
+                eye_end: bridge.onto_eye,
+                before_eye_end: bridge.eye_reverse * walk.links.last().map_or(0.0, |link| link.jacobian),
+                light_end: bridge.onto_light,
+                before_light_end: bridge.light_reverse * light.links.last().map_or(0.0, |link| link.jacobian),
             };
             chosen.weight(&whole(&light.links, &walk.links, joint), &walk.ends(light.start), light.vertices)
         }

@@ -7,6 +7,7 @@ use crate::path::connect::unblocked;
 use crate::path::connect::whole::{Joint, whole};
 use crate::path::expression::language::{EyeState, LightState};
 use crate::path::mis::exhaustive::{Ends, Link};
+use crate::path::mis::recursive;
 use crate::path::rules::{Rules, Weighing};
 use crate::path::tally::{Receiver, Tally};
 use crate::path::throughput::Throughput;
@@ -83,8 +84,7 @@ fn weight<L: Throughput<LightState>>(
         Weighing::FromEye => 0.0,
         Weighing::ToLens => 1.0,
         Weighing::All(h) => {
-            let onto = end.from_eye / walk.rules.light_paths;
-            1.0 / (1.0 + walk.partial.behind(*h, onto, reverse))
+            recursive::to_lens(*h, &walk.partial, end.from_eye / walk.rules.light_paths, reverse)
         }
         Weighing::Chosen(chosen) => {
             let lens = Link { forward: 1.0, reverse: 0.0, jacobian: 0.0, specular: false };
@@ -129,7 +129,7 @@ pub fn light_to_lens<E: Throughput<EyeState>, L: Throughput<LightState>>(
     let weight = match &rules.weighing {
         Weighing::FromEye => 0.0,
         Weighing::ToLens => 1.0,
-        Weighing::All(h) => 1.0 / (1.0 + h.of(from_eye / (rules.light_paths * shown.place))),
+        Weighing::All(h) => recursive::light_to_lens(*h, from_eye / (rules.light_paths * shown.place)),
         Weighing::Chosen(chosen) => {
             let light = Link { forward: shown.place, reverse: 0.0, jacobian: 0.0, specular: false };
             let lens = Link { forward: 1.0, ..light };

@@ -7,6 +7,7 @@ use crate::path::connect::unblocked;
 use crate::path::connect::whole::{Joint, whole};
 use crate::path::expression::language::{EyeState, LightState};
 use crate::path::mis::exhaustive::Link;
+use crate::path::mis::recursive::{self, NextEventDensities};
 use crate::path::rules::Weighing;
 use crate::path::tally::{Receiver, Tally};
 use crate::path::throughput::Throughput;
@@ -98,8 +99,8 @@ fn weight<S: Throughput<EyeState>>(
             let around = Around::new(walk, vertex, light, event);
             let picked = f64::from(around.emission.origin) / around.next_event;
             let reverse = f64::from(vertex.reverse_pdf(event.direction));
-            let longer = h.of(picked) * walk.partial.behind(*h, around.first_edge, reverse);
-            1.0 / (h.of(hit) + 1.0 + longer)
+            let densities = NextEventDensities { hit, picked, first_edge: around.first_edge, reverse };
+            recursive::next_event(*h, &walk.partial, &densities)
         }
         Weighing::Chosen(chosen) => {
             let around = Around::new(walk, vertex, light, event);

@@ -3,3 +3,7 @@
 pub mod exhaustive;
 pub mod heuristic;
 pub mod partial;
+pub mod recursive;
+
+#[cfg(test)]
+mod tests;
