@@ -98,6 +98,8 @@ pub enum Shows {
     Paths(String),
     /// What one technique of `bidirectional` adds to the picture, weight included.
     Strategy(Strategy),
+    /// The picture of `photon` with half the area of gathering: the difference tells its bias.
+    Narrow,
 }
 
 /// A technique: how many vertices of a path come from the light, and how many from the eye, light and lens included.

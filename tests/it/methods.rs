@@ -151,3 +151,18 @@ fn a_lens_and_parallel_rays() {
     with_lens.lens = Some(Lens { radius: 0.2, focus_distance: 3.0 });
     agree(&glb, &with_lens, [128, 64, 128], 0.003, "lens");
 }
+
+#[test]
+fn photons_scratch() {
+    use ovtigre_core::settings::{Layer, Shows};
+    let glb = room(10.0, |glb| add(glb, lambert(0.8, 0.0), cuboid(Vec3::new(-0.5, -1.0, -0.5), Vec3::new(0.2, 0.1, 0.2))));
+    let s = settings(32, 32, 16);
+    let path = rendered(&glb, &s, 64).mean();
+    println!("path {path:?}");
+    let mut s = by(Method::Photon, &s);
+    s.layers.push(Layer { name: "narrow".into(), shows: Shows::Narrow });
+    for n in [4, 16, 64] {
+        let p = rendered(&glb, &s, n);
+        println!("{n}: {:?} narrow {:?}", p.mean(), p.mean_of(1));
+    }
+}

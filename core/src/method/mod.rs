@@ -4,3 +4,4 @@ pub mod bidirectional;
 pub mod camera;
 pub mod light;
 pub mod path;
+pub mod photon;

@@ -6,6 +6,7 @@ pub mod eye;
 pub mod light;
 pub mod media;
 pub mod mis;
+pub mod photons;
 pub mod rules;
 pub mod tally;
 pub mod throughput;

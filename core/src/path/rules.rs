@@ -10,6 +10,8 @@ use crate::scene::Scene;
 use crate::scene::light::Light;
 use crate::settings::{Gloss, Method, Settings, Shadows, Shows, Strategy, Weights};
 
+/// Most light subpaths of a pass of photons.
+const PHOTON_PATHS_MAX: usize = 1 << 18;
 /// Name of the environment in path expressions.
 const ENVIRONMENT: &str = "environment";
 
@@ -28,7 +30,7 @@ pub struct Rules {
     pub shadows: Shadows,
     /// How techniques share a path.
     pub weighing: Weighing,
-    /// Light subpaths for every eye subpath of a pixel: as many as the picture has pixels.
+    /// Light subpaths for every eye subpath of a pixel.
     pub light_paths: f64,
     /// Names of the lights, by number.
     tags: Vec<LightTag>,
@@ -36,6 +38,7 @@ pub struct Rules {
     rule_planes: Vec<usize>,
     /// The plane of each technique that has one.
     technique_planes: Vec<(Technique, usize)>,
+    narrow_plane: Option<usize>,
 }
 
 /// How techniques share a path.
@@ -55,7 +58,7 @@ impl Rules {
     /// From the settings of a picture of `pixels` pixels.
     pub fn new(scene: &Scene, settings: &Settings, pixels: usize) -> Result<Self, ExpressionError> {
         let mut expressions = vec![settings.paths.as_str()];
-        let (mut rule_planes, mut technique_planes) = (vec![0], Vec::new());
+        let (mut rule_planes, mut technique_planes, mut narrow_plane) = (vec![0], Vec::new(), None);
         for (i, layer) in settings.layers.iter().enumerate() {
             match &layer.shows {
                 Shows::Paths(paths) => {
@@ -65,6 +68,7 @@ impl Rules {
                 Shows::Strategy(Strategy { s, t }) => {
                     technique_planes.push(((*s as usize, *t as usize), i + 1));
                 }
+                Shows::Narrow => narrow_plane = Some(i + 1),
             }
         }
         let language = Language::compile(&expressions)?;
@@ -76,16 +80,22 @@ impl Rules {
             bounces: settings.bounces.unwrap_or(u32::MAX),
             shadows: settings.shadows,
             weighing: weighing(settings),
-            light_paths: pixels as f64,
+            light_paths: light_paths(settings.method, pixels) as f64,
             tags,
             rule_planes,
             technique_planes,
+            narrow_plane,
         })
     }
 
     /// Number of pictures.
     pub fn planes(&self) -> usize {
-        self.rule_planes.len() + self.technique_planes.len()
+        self.rule_planes.len() + self.technique_planes.len() + usize::from(self.narrow_plane.is_some())
+    }
+
+    /// The plane that shows the picture with half the area of gathering.
+    pub fn narrow_plane(&self) -> Option<usize> {
+        self.narrow_plane
     }
 
     /// Whether every path counts, for one picture.
@@ -124,6 +134,14 @@ impl Rules {
             Weighing::All(heuristic) => heuristic,
             _ => Heuristic::Balance,
         }
+    }
+}
+
+/// Light subpaths for every eye subpath of a pixel: as many as a picture has pixels, but photons have to be kept.
+fn light_paths(method: Method, pixels: usize) -> usize {
+    match method {
+        Method::Photon => pixels.min(PHOTON_PATHS_MAX),
+        _ => pixels,
     }
 }
 

@@ -64,6 +64,21 @@ impl Tally {
         light: &impl Throughput<LightState>,
         factor: Rgb,
     ) {
+        self.deposit_gathered(rules, receiver, technique, eye, light, [factor; 2]);
+    }
+
+    /// The same of light that was gathered from photons: `factor` in the picture and its layers, `narrow` in the plane that
+    /// shows half the area of gathering.
+    #[inline]
+    pub fn deposit_gathered(
+        &mut self,
+        rules: &Rules,
+        receiver: Receiver,
+        technique: Technique,
+        eye: &impl Throughput<EyeState>,
+        light: &impl Throughput<LightState>,
+        [factor, narrow]: [Rgb; 2],
+    ) {
         eye.each(|q, from_eye| {
             light.each(|l, from_light| {
                 let value = from_eye * from_light * factor;
@@ -75,10 +90,14 @@ impl Tally {
                 for rule in accepted.iter() {
                     self.add(receiver, rules.rule_plane(rule), value);
                 }
-                if accepted.has(0)
-                    && let Some(plane) = rules.technique_plane(technique)
-                {
+                if !accepted.has(0) {
+                    return;
+                }
+                if let Some(plane) = rules.technique_plane(technique) {
                     self.add(receiver, plane, value);
+                }
+                if let Some(plane) = rules.narrow_plane() {
+                    self.add(receiver, plane, from_eye * from_light * narrow);
                 }
             });
         });

@@ -95,6 +95,11 @@ impl<'s> Vertex<'s> {
         visible.then(|| Self { bsdf: Bsdf::from_surface(&at.surface()), at, wo, cos_back })
     }
 
+    /// Unit direction back along the path.
+    pub fn back(&self) -> Vec3 {
+        self.at.shading.to_world(self.wo)
+    }
+
     /// Whether a next event can contribute.
     pub fn is_smooth(&self) -> bool {
         self.bsdf.is_smooth_anywhere()

@@ -97,6 +97,11 @@ pub trait Visitor<'a, S: State, T: Throughput<S>> {
         tally: &mut Tally,
     );
 
+    /// Whether the surface's scattering is of interest.
+    fn goes_on(&self, _: &Walk<'a, S, T>) -> bool {
+        true
+    }
+
     /// The surface scatters.
     fn scatters(&mut self, walk: &Walk<'a, S, T>, vertex: &Vertex<'a>, tally: &mut Tally);
 }
@@ -140,7 +145,7 @@ impl<'a, S: State, T: Throughput<S>> Walk<'a, S, T> {
             let at = self.scene.data.interaction(hit.instance, hit.triangle, hit.barycentric);
             self.arrive(&at);
             visitor.arrives(&mut self, &at, (hit.instance, hit.triangle), tally);
-            if self.scatterings >= self.rules.bounces {
+            if self.scatterings >= self.rules.bounces || !visitor.goes_on(&self) {
                 return;
             }
             let Some(vertex) = Vertex::new(at, -self.edge.ray.direction, self.rules) else { return };

@@ -9,7 +9,7 @@ use crate::path::rules::Rules;
 use crate::path::throughput::{Carriage, Everything, Filtered};
 use crate::render::progress::Progress;
 use crate::render::sample::Sampling;
-use crate::render::{splats, tile};
+use crate::render::{passes, splats, tile};
 use crate::scene::Scene;
 use crate::settings::{Method, Settings};
 
@@ -42,9 +42,13 @@ pub fn render(
     }
 }
 
-fn run<C: Carriage>(sampling: &Sampling<'_>, progress: &Progress) -> Result<Sum, RenderError> {
+fn run<C: Carriage>(sampling: &Sampling<'_>, progress: &Progress) -> Result<Sum, RenderError>
+where
+    C::Light: Send + Sync,
+{
     match sampling.settings.method {
         Method::Light | Method::Bidirectional => splats::render::<C>(sampling, progress),
+        Method::Photon => passes::render::<C>(sampling, progress),
         _ => tile::render::<C>(sampling, progress),
     }
 }

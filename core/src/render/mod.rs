@@ -2,6 +2,7 @@
 
 pub mod batch;
 pub mod inspect;
+mod passes;
 pub mod prepare;
 pub mod profile;
 pub mod progress;
