@@ -111,6 +111,8 @@ pub enum Shows {
     Paths(String),
     /// What one technique of `bidirectional` adds to the picture, weight included.
     Strategy(Strategy),
+    /// The picture of `photon` with half the area of gathering: the difference tells its bias.
+    Narrow,
 }
 
 impl fmt::Display for Shows {

@@ -5,5 +5,7 @@
 mod bad_input;
 mod closed_forms;
 mod faults;
+mod methods;
 mod same_bits;
+mod techniques;
 mod tidy;

@@ -112,6 +112,15 @@ impl Scattered {
     }
 }
 
+impl core::ops::Mul<f32> for Scattered {
+    type Output = Self;
+
+    #[inline]
+    fn mul(self, factor: f32) -> Self {
+        Self { diffuse: self.diffuse * factor, glossy: self.glossy * factor }
+    }
+}
+
 /// A sampled direction.
 #[derive(Clone, Copy, Debug)]
 pub struct BsdfSample {

@@ -42,6 +42,8 @@ pub struct NextEvent {
     pub radiance: Rgb,
     /// Density over solid angle at the point; one for a light without extent.
     pub pdf: f32,
+    /// |cos θ| at the light's surface; one for other lights.
+    pub cos: f32,
     /// Whether directions sampled from a BSDF can find this light, too.
     pub found_by: FoundBy,
     /// Where the shadow ray ends.
@@ -87,6 +89,7 @@ impl Light {
                     direction,
                     radiance,
                     pdf,
+                    cos: 1.0,
                     found_by,
                     end: ShadowEnd::Infinity,
                 })
@@ -154,13 +157,14 @@ fn sample_triangle(
         direction,
         radiance,
         pdf,
+        cos: cos.abs(),
         found_by: FoundBy::Both,
         end,
     })
 }
 
 /// Weights of the second and third corner as the mesh has them, from those of [`SceneData::corners`].
-fn mesh_order(data: &SceneData, instance: u32, barycentric: Vec2) -> Vec2 {
+pub(super) fn mesh_order(data: &SceneData, instance: u32, barycentric: Vec2) -> Vec2 {
     match data.instances[instance as usize].placement.handedness() {
         Handedness::Kept => barycentric,
         Handedness::Mirrored => Vec2::new(barycentric.y, barycentric.x),
@@ -201,6 +205,7 @@ fn sample_punctual(kind: &PunctualKind, point: Vec3) -> Option<NextEvent> {
         direction,
         radiance,
         pdf: 1.0,
+        cos: 1.0,
         found_by: FoundBy::NextEvent,
         end,
     })
