@@ -143,8 +143,10 @@ pub enum SampleKind {
         /// Density over solid angle.
         pdf: f32,
     },
-    /// Letter `S_M`: `weight` is f · |cos θᵢ| over the discrete probability of this choice.
+    /// A Dirac delta: `weight` is f · |cos θᵢ| over the discrete probability of this choice.
     Specular {
+        /// `S_M`, or `S_T` of the ideal twin of a glossy lobe.
+        letter: Letter,
         /// Throughput factor.
         weight: Rgb,
         /// Discrete probability of the choice.

@@ -94,13 +94,13 @@ impl fmt::Display for ExpressionError {
 impl std::error::Error for ExpressionError {}
 
 impl ExpressionError {
-    /// Two lines for a terminal: the expression, and a caret below the character at fault with what is wrong. Of a
-    /// long expression only the neighbourhood is shown.
+    /// Two lines for a terminal: the expression, and a caret below the character at fault. Of a long expression only
+    /// the neighbourhood is shown.
     pub fn marked(&self) -> String {
         let printable = |c: char| if c.is_control() { ' ' } else { c };
         let from = self.at.saturating_sub(AROUND);
         let shown: String = self.text.chars().skip(from).take(2 * AROUND).map(printable).collect();
         let (dots, indent) = if from > 0 { ("…", self.at - from + 1) } else { ("", self.at) };
-        format!("{dots}{shown}\n{}^ {}", " ".repeat(indent), self.fault)
+        format!("{dots}{shown}\n{}^", " ".repeat(indent))
     }
 }

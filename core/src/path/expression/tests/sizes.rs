@@ -6,7 +6,7 @@ use crate::path::expression::presets::{PRESETS, preset, shown};
 use crate::settings::Gloss;
 
 fn language(rules: &[&str]) -> Language {
-    Language::compile(rules).unwrap_or_else(|e| panic!("{}", e.marked()))
+    Language::compile(rules).unwrap_or_else(|e| panic!("{e}"))
 }
 
 #[test]

@@ -46,7 +46,7 @@ fn joined(language: &Language, tag: LightTag, word: &[Letter], eye: usize) -> Ru
 
 /// Compares all words and splits; the number of words that some rule takes.
 fn compare(rules: &[&str], lights: &[&[&str]], longest: usize) -> usize {
-    let language = Language::compile(rules).unwrap_or_else(|e| panic!("{}", e.marked()));
+    let language = Language::compile(rules).unwrap_or_else(|e| panic!("{e}"));
     let trees: Vec<Node> = rules.iter().map(|text| parse(text).unwrap()).collect();
     let mut taken = 0;
     for light in lights {
