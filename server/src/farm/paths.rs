@@ -17,11 +17,13 @@ const LAYERS_MAX: usize = RULES_MAX - 1;
 /// Longest name of a layer.
 const NAME_MAX: usize = 64;
 /// Names that a picture's channels or its parts have already.
-const TAKEN: [&str; 5] = ["R", "G", "B", "error", "picture"];
+const TAKEN: [&str; 6] = ["R", "G", "B", "error", "picture", NARROW];
+/// The layer that tells the bias of photons.
+const NARROW: &str = "narrow";
 /// Vertices of either subpath of a technique.
 const VERTICES_MAX: u32 = 255;
 /// Methods that this version renders by.
-const RENDERED: [Method; 3] = [Method::Path, Method::Light, Method::Bidirectional];
+const RENDERED: [Method; 4] = [Method::Path, Method::Light, Method::Bidirectional, Method::Photon];
 
 /// What a job shows, and how.
 #[derive(Clone, Debug, PartialEq)]
@@ -46,7 +48,7 @@ pub struct Chosen {
 pub fn choose(request: &JobRequest, note: &mut impl FnMut(&str, String)) -> Chosen {
     let (pointer, paths, gloss) = picture(request, note);
     let method = method(request, note);
-    let chosen = Chosen {
+    let mut chosen = Chosen {
         layers: layers(request, note),
         strategies: strategies(request, note),
         weights: weights(request),
@@ -55,6 +57,9 @@ pub fn choose(request: &JobRequest, note: &mut impl FnMut(&str, String)) -> Chos
         gloss,
         method,
     };
+    if chosen.method == Method::Photon && chosen.layers.len() < LAYERS_MAX {
+        chosen.layers.push(Layer { name: NARROW.to_owned(), shows: Shows::Narrow });
+    }
     if let Some(language) = compile(&chosen, pointer, note) {
         fits(request, &chosen, &language, pointer, note);
     }
@@ -185,7 +190,7 @@ fn strategy(text: &str) -> Result<Strategy, String> {
 fn compile(chosen: &Chosen, picture: &str, note: &mut impl FnMut(&str, String)) -> Option<Language> {
     let layers = chosen.layers.iter().enumerate().filter_map(|(i, layer)| match &layer.shows {
         Shows::Paths(paths) => Some((at_layer(i), paths.as_str())),
-        Shows::Strategy(_) => None,
+        Shows::Strategy(_) | Shows::Narrow => None,
     });
     let rules: Vec<(String, &str)> =
         std::iter::once((picture.to_owned(), chosen.paths.as_str())).chain(layers).collect();
