@@ -3,7 +3,6 @@
 use crate::bsdf::Bsdf;
 use crate::bsdf::event::{SampleKind, Transport};
 use crate::math::colour::Rgb;
-use crate::math::robust::offset_origin;
 use crate::scene::interaction::Interaction;
 use crate::trace::ray::Ray;
 use glam::{Vec2, Vec3};
@@ -97,7 +96,7 @@ impl<'s> Vertex<'s> {
 
     /// The point moved off the surface towards `direction`.
     pub fn leave(&self, direction: Vec3) -> Vec3 {
-        offset_origin(self.at.position, self.at.error, self.at.ng, direction)
+        self.at.leave(direction)
     }
 
     /// The ray that leaves towards `direction`.
