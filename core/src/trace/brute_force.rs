@@ -258,6 +258,49 @@ fn equally_near_hits_go_to_the_smallest_index() {
     assert_eq!(placed.transmittance(&ray, |_| 1.0), 1.0);
 }
 
+/// A sheet of triangles with diagonals in both directions, each triangle with vertices of its own: what rays find right
+/// on the edges and at the vertices, where up to eight triangles meet.
+#[test]
+fn a_sheet_is_met_once_even_on_its_edges() {
+    let (n, mut sheet) = (8, Mesh { positions: vec![], triangles: vec![] });
+    let at = |x: i32, y: i32| Vec3::new(x as f32, y as f32, 0.0);
+    for (x, y) in (-n..n).flat_map(|x| (-n..n).map(move |y| (x, y))) {
+        let [a, b, c, d] = [at(x, y), at(x + 1, y), at(x + 1, y + 1), at(x, y + 1)];
+        let halves = if (x + y) % 2 == 0 { [[a, b, c], [c, a, d]] } else { [[d, a, b], [b, d, c]] };
+        for mut half in halves {
+            half.rotate_left((x + n) as usize % 3);
+            let first = sheet.positions.len() as u32;
+            sheet.positions.extend(half);
+            sheet.triangles.push([first, first + 1, first + 2]);
+        }
+    }
+    let turned = Affine3A::from_mat3(glam::Mat3::from_cols(Vec3::Z, -Vec3::X, Vec3::Y));
+    for to_world in [Affine3A::IDENTITY, Affine3A::from_translation(Vec3::new(16.0, -2.0, 0.5)), turned] {
+        let placed = Aggregate::build(vec![sheet.tree()], &[Placement { mesh: 0, to_world }]).unwrap();
+        for (x, y) in (-28..=28).flat_map(|x| (-28..=28).map(move |y| (x, y))) {
+            let target = Vec3::new(x as f32 / 4.0, y as f32 / 4.0, 0.0);
+            for slant in
+                [Vec3::ZERO, Vec3::new(0.5, 0.25, 0.0), Vec3::new(-1.0, 1.0, 0.0), Vec3::new(0.0, 4.0, 0.0)]
+            {
+                let direction =
+                    to_world.transform_vector3(if x % 2 == 0 { Vec3::Z } else { -Vec3::Z } + slant);
+                let ray = Ray::new(to_world.transform_point3(target) - direction, direction);
+                let met = RefCell::new(Vec::new());
+                let refuse = |hit: &Hit| {
+                    met.borrow_mut().push(hit.triangle);
+                    false
+                };
+                assert_eq!(placed.transmittance(&ray, |_| 0.6), 0.6, "{ray:?}");
+                assert_eq!(placed.transmittance_with::<Portable>(&ray, |_| 0.6), 0.6, "{ray:?}");
+                assert_eq!(placed.closest(&ray, refuse), None);
+                assert_eq!(met.borrow().len(), 1, "{ray:?}");
+                let hit = placed.closest(&ray, |_| true).unwrap();
+                assert_eq!((hit.t, hit.triangle), (1.0, met.borrow()[0]), "{ray:?}");
+            }
+        }
+    }
+}
+
 /// The triangle test beside a plain one in f64, where the ray passes clear of edges.
 #[test]
 fn hits_agree_with_double_precision() {
