@@ -17,6 +17,7 @@ pub struct Instance {
 
 /// Where an instance stands.
 #[derive(Clone, Copy, Debug)]
+#[expect(clippy::large_enum_variant, reason = "all instances are moved but one at most, the gathered mesh")]
 pub enum Placement {
     /// The mesh's vertices are the scene's already.
     World,

@@ -93,7 +93,7 @@ fn star(points: u32, width: f32) -> Vec<(f32, f32)> {
     let inner = libm::sinf(width / 2.0) / libm::sinf(half + width / 2.0);
     let corner = |i: u32| {
         let (sin, cos) = libm::sincosf(i as f32 * half);
-        let radius = if i % 2 == 0 { 1.0 } else { inner };
+        let radius = if i.is_multiple_of(2) { 1.0 } else { inner };
         (radius * cos, radius * sin)
     };
     (0..2 * points).map(corner).collect()
