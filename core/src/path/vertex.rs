@@ -3,7 +3,6 @@
 use crate::bsdf::Bsdf;
 use crate::bsdf::event::{Letter, Letters, SampleKind, Scattered, Transport};
 use crate::math::colour::Rgb;
-use crate::math::robust::offset_origin;
 use crate::scene::interaction::Interaction;
 use crate::trace::ray::Ray;
 use glam::{Vec2, Vec3};
@@ -155,7 +154,7 @@ impl<'s> Vertex<'s> {
 
     /// The point moved off the surface towards `direction`.
     pub fn leave(&self, direction: Vec3) -> Vec3 {
-        offset_origin(self.at.position, self.at.error, self.at.ng, direction)
+        self.at.leave(direction)
     }
 
     /// The ray that leaves towards `direction`.

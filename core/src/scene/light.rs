@@ -1,7 +1,6 @@
 //! One light, and next events towards it.
 
 use crate::math::colour::Rgb;
-use crate::math::robust::offset_origin;
 use crate::math::spherical_triangle::SphericalTriangle;
 use crate::math::warp;
 use crate::scene::data::SceneData;
@@ -152,7 +151,7 @@ fn sample_triangle(
         Some(solid_angle) => 1.0 / solid_angle,
         None => distance * distance / (cos.abs() * area(corners)).max(f32::MIN_POSITIVE),
     };
-    let end = ShadowEnd::Point(offset_origin(at.position, at.error, at.ng, -direction));
+    let end = ShadowEnd::Point(at.leave(-direction));
     (pdf.is_finite() && pdf > 0.0).then_some(NextEvent {
         direction,
         radiance,
