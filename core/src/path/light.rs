@@ -2,7 +2,6 @@
 
 use crate::bsdf::event::Transport;
 use crate::math::colour::Rgb;
-use crate::math::robust::offset_origin;
 use crate::path::connect::lens::{Shown, hit_lens, light_to_lens, to_lens};
 use crate::path::connect::light_vertex::{LightStart, LightVertex};
 use crate::path::connect::unblocked;
@@ -154,7 +153,7 @@ fn show<C: Carriage>(
         Place::Surface(at) => {
             let Some(seen) = view.see(at.position, lens) else { return };
             let radiance = at.emission(at.side(seen.direction)) * at.alpha();
-            let start = offset_origin(at.position, at.error, at.ng, seen.direction);
+            let start = at.leave(seen.direction);
             let ray = Ray { origin: start, direction: seen.end - start, t_max: 1.0 };
             let squared = f64::from((seen.end - at.position).length_squared());
             (seen, radiance, ray, squared, f64::from(seen.direction.dot(at.ng).abs()))

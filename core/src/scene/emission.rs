@@ -2,7 +2,6 @@
 
 use crate::math::colour::Rgb;
 use crate::math::frame::Frame;
-use crate::math::robust::offset_origin;
 use crate::math::warp;
 use crate::scene::data::SceneData;
 use crate::scene::environment::Environment;
@@ -173,7 +172,7 @@ fn from_surface(at: &Interaction<'_>, lobe: f32, u: Vec2) -> Emission {
     let direction = Frame::around(normal).to_world(local).normalize();
     let cos = direction.dot(normal);
     Emission {
-        ray: Ray::new(offset_origin(at.position, at.error, at.ng, direction), direction),
+        ray: Ray::new(at.leave(direction), direction),
         radiance: at.emission(side) * at.alpha(),
         pdf: surface_direction_pdf(at.material.sides, cos),
         cos,
