@@ -21,6 +21,8 @@ pub enum Dimension {
     Film,
     /// Place on the lens.
     Lens,
+    /// When the shutter lets it in: the first number, as a share of the shutter's time.
+    Time,
     /// At the n-th scattering of the eye subpath, from 0.
     Eye(u32, Use),
 }
@@ -50,6 +52,7 @@ impl Dimension {
         match self {
             Self::Film => 0,
             Self::Lens => 1,
+            Self::Time => 2,
             Self::Eye(n, what) => FIRST_SCATTERING + SCATTERING * n + what as u32,
         }
     }

@@ -33,7 +33,7 @@ pub(crate) fn read(
             continue;
         };
         let name = if node.name.is_empty() { item.name() } else { node.name.clone() };
-        lights.push(Punctual { name, kind });
+        lights.push(Punctual { name, kind, knots: Vec::new() });
     }
     Ok(lights)
 }

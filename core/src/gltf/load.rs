@@ -12,6 +12,7 @@ use crate::gltf::shapes::{Materials, Shape};
 use crate::gltf::textures::TextureTable;
 use crate::gltf::{cameras, extensions, lights, materials, nodes, pictures, shapes, survey};
 use crate::scene::data::SceneData;
+use crate::scene::knots::Knots;
 use crate::scene::material::{Coverage, Material, MaterialId};
 use crate::scene::texture::Texture;
 use std::collections::BTreeMap;
@@ -61,6 +62,7 @@ pub fn load(bundle: &Bundle, limits: &Limits) -> Result<Loaded, LoadError> {
         punctual: lights::read(&document, &tree, &normalisation, &mut problems)?,
         bounds,
         normalisation,
+        knots: Knots::STILL,
     };
     let metres = normalisation.metres(1.0);
     for volume in scene.materials.iter_mut().filter_map(|m| m.volume.as_mut()) {

@@ -30,9 +30,9 @@ pub fn next_event(
 ) -> Rgb {
     let choice = sampler.pair(Dimension::Eye(scattering, Use::Light)).x;
     let place = sampler.pair(Dimension::Eye(scattering, Use::LightPoint));
-    let point = vertex.at.position;
-    let Some(event) = scene.lights.sample(&scene.data, scene.environment.as_ref(), point, choice, place)
-    else {
+    let (point, moment) = (vertex.at.position, vertex.at.moment);
+    let environment = scene.environment.as_ref();
+    let Some(event) = scene.lights.sample(&scene.data, environment, moment, point, choice, place) else {
         return Vec3::ZERO;
     };
     let (value, bsdf_pdf) = vertex.evaluate(event.direction, Transport::Radiance);
@@ -46,9 +46,9 @@ pub fn next_event(
     let origin = vertex.leave(event.direction);
     let (ray, distance) = match event.end {
         ShadowEnd::Point(end) => {
-            (Ray { origin, direction: end - origin, t_max: 1.0 }, (end - origin).length())
+            (Ray { origin, direction: end - origin, t_max: 1.0, moment }, (end - origin).length())
         }
-        ShadowEnd::Infinity => (Ray::new(origin, event.direction), 0.0),
+        ShadowEnd::Infinity => (Ray::new(origin, event.direction).at(moment), 0.0),
     };
     let passes = match shadows {
         Shadows::On => {

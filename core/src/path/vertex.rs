@@ -102,6 +102,6 @@ impl<'s> Vertex<'s> {
 
     /// The ray that leaves towards `direction`.
     pub fn ray(&self, direction: Vec3) -> Ray {
-        Ray::new(self.leave(direction), direction)
+        Ray::new(self.leave(direction), direction).at(self.at.moment)
     }
 }

@@ -68,7 +68,7 @@ pub fn radiance(scene: &Scene, rules: WalkRules, ray: Ray, sampler: &Sampler, ra
         let Some(hit) = scene.closest(&walk.ray, key) else {
             return radiance + walk.throughput * walk.environment_light();
         };
-        let at = scene.data.interaction(hit.instance, hit.triangle, hit.barycentric);
+        let at = scene.data.interaction(hit.instance, hit.triangle, hit.barycentric, walk.ray.moment);
         let back = -walk.ray.direction;
         let distance = (at.position - walk.ray.origin).length();
         walk.throughput *= walk.media.transmittance_to(distance, &at, back);

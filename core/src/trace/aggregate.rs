@@ -3,14 +3,16 @@
 use super::bounds::Bounds;
 use super::build_error::{BuildError, check_count};
 use super::collapse;
-use super::instance::{Instance, Placement};
+use super::instance::{Instance, Moved, Placement, STANDS};
 use super::lanes::{Lanes, Native};
-use super::mesh::MeshTree;
+use super::mesh::{MeshTree, Piece};
+use super::moment::Moment;
 use super::prepared::Prepared;
 use super::ray::{Hit, Ray};
+use super::triangle::{Block, Found};
 use super::walk::{Nearest, Ordering, Stored, walk};
 use super::wide::Tree;
-use glam::Vec2;
+use glam::{Affine3A, Vec2};
 use std::ops::ControlFlow;
 
 /// Placed meshes. Answers depend on the geometry and the ray alone: not on threads, nor on what was asked before.
@@ -18,6 +20,8 @@ use std::ops::ControlFlow;
 pub struct Aggregate {
     meshes: Vec<MeshTree>,
     instances: Vec<Instance>,
+    /// The transforms at each knot of the instances that move.
+    motions: Vec<Box<[Affine3A]>>,
     top: Tree,
     /// The instance in each leaf of `top`.
     leaves: Vec<u32>,
@@ -29,8 +33,19 @@ pub struct Aggregate {
 impl Aggregate {
     /// Places meshes; a placement's index is the `instance` of hits on it.
     pub fn build(meshes: Vec<MeshTree>, placements: &[Placement]) -> Result<Self, BuildError> {
+        Self::moving(meshes, placements, |_| &[])
+    }
+
+    /// Places meshes of which some move: `knots` tells the transforms of a placement at each knot of the scene's motion,
+    /// none of one that stands. Its `to_world` is the first of them. Every one of them can be inverted.
+    pub fn moving<'k>(
+        meshes: Vec<MeshTree>,
+        placements: &[Placement],
+        knots: impl Fn(usize) -> &'k [Affine3A],
+    ) -> Result<Self, BuildError> {
         check_count(placements.len())?;
         let mut instances = Vec::with_capacity(placements.len());
+        let mut motions = Vec::new();
         let (mut boxes, mut filled) = (Vec::new(), Vec::new());
         for (index, placement) in placements.iter().enumerate() {
             let mesh = meshes.get(placement.mesh as usize).ok_or(BuildError::Mesh {
@@ -39,8 +54,17 @@ impl Aggregate {
                 meshes: meshes.len(),
             })?;
             let bad = BuildError::Transform { placement: index };
-            let instance = Instance::new(*placement).ok_or_else(|| bad.clone())?;
-            let bounds = instance.world_bounds(mesh.bounds()).ok_or(bad)?;
+            let path = knots(index);
+            let (instance, bounds) = if path.is_empty() {
+                let instance = Instance::new(*placement).ok_or_else(|| bad.clone())?;
+                (instance, instance.world_bounds(mesh.bounds()).ok_or(bad)?)
+            } else {
+                let number = motions.len() as u32;
+                motions.push(path.into());
+                let instance =
+                    Instance::moving(placement.mesh, path[0], number).ok_or_else(|| bad.clone())?;
+                (instance, Instance::bounds_on(path, mesh.bounds()).ok_or(bad)?)
+            };
             instances.push(instance);
             if !bounds.is_empty() {
                 boxes.push(bounds);
@@ -54,7 +78,7 @@ impl Aggregate {
             _ => None,
         };
         let bounds = boxes.iter().fold(Bounds::EMPTY, |all, b| all.union(*b));
-        Ok(Self { meshes, instances, top, leaves, only, bounds })
+        Ok(Self { meshes, instances, motions, top, leaves, only, bounds })
     }
 
     /// The box around everything, in the world.
@@ -111,17 +135,21 @@ impl Aggregate {
             return ControlFlow::Continue(());
         };
         if let Some(only) = self.only {
-            return self.visit_mesh::<L, O>(only, &prepared, visitor);
+            return self.visit_mesh::<L, O>(only, ray.moment, &prepared, visitor);
         }
         walk::<L, O>(&self.top, &prepared, prepared.inward(visitor.limit()), |leaf, limit| {
             let id = self.leaves[leaf];
-            match &self.instances[id as usize].moved {
-                None => self.visit_mesh::<L, O>(id, &prepared, visitor)?,
+            let instance = &self.instances[id as usize];
+            match &instance.moved {
+                None => self.visit_mesh::<L, O>(id, ray.moment, &prepared, visitor)?,
                 Some(moved) => {
-                    let origin = moved.point_inward(ray.origin);
-                    let direction = moved.direction_inward(ray.direction);
-                    match Prepared::new(origin, direction) {
-                        Some(inner) => self.visit_mesh::<L, O>(id, &inner, visitor)?,
+                    let inner = if instance.motion == STANDS {
+                        Prepared::new(moved.point_inward(ray.origin), moved.direction_inward(ray.direction))
+                    } else {
+                        self.inside_moving(instance.motion, ray)
+                    };
+                    match inner {
+                        Some(inner) => self.visit_mesh::<L, O>(id, ray.moment, &inner, visitor)?,
                         None => return ControlFlow::Continue(limit),
                     }
                 }
@@ -130,30 +158,70 @@ impl Aggregate {
         })
     }
 
+    /// A ray in the space of an instance that moves; `None` where the instance is flat at that moment.
+    #[inline(never)]
+    fn inside_moving(&self, motion: u32, ray: &Ray) -> Option<Prepared> {
+        let moved = Moved::new(ray.moment.transform(&self.motions[motion as usize]))?;
+        Prepared::new(moved.point_inward(ray.origin), moved.direction_inward(ray.direction))
+    }
+
     fn visit_mesh<L: Lanes, O: Ordering>(
         &self,
         instance: u32,
+        moment: Moment,
         ray: &Prepared,
         visitor: &mut impl Visitor,
     ) -> ControlFlow<()> {
         let mesh = &self.meshes[self.instances[instance as usize].mesh as usize];
+        if let Some(piece) = mesh.piece(moment) {
+            return Self::visit_piece::<L, O>(piece, instance, moment, ray, visitor);
+        }
         walk::<L, O>(&mesh.tree, ray, ray.inward(visitor.limit()), |leaf, limit| {
             let block = &mesh.blocks[leaf];
             let Some(found) = block.intersect::<L>(ray, limit) else { return ControlFlow::Continue(limit) };
-            let mut mask = found.mask;
-            while mask != 0 {
-                let lane = mask.trailing_zeros() as usize & 7;
-                mask &= mask - 1;
-                visitor.hit(Hit {
-                    t: ray.outward(found.t.0[lane]),
-                    instance,
-                    triangle: block.id(lane),
-                    barycentric: Vec2::new(found.second.0[lane], found.third.0[lane]),
-                })?;
-            }
+            bring(&found, block, instance, ray, visitor)?;
             ControlFlow::Continue(ray.inward(visitor.limit()))
         })
     }
+
+    #[inline(never)]
+    fn visit_piece<L: Lanes, O: Ordering>(
+        piece: &Piece,
+        instance: u32,
+        moment: Moment,
+        ray: &Prepared,
+        visitor: &mut impl Visitor,
+    ) -> ControlFlow<()> {
+        walk::<L, O>(&piece.tree, ray, ray.inward(visitor.limit()), |leaf, limit| {
+            let block = Block::between::<L>(&piece.before[leaf], &piece.after[leaf], moment);
+            let Some(found) = block.intersect::<L>(ray, limit) else { return ControlFlow::Continue(limit) };
+            bring(&found, &block, instance, ray, visitor)?;
+            ControlFlow::Continue(ray.inward(visitor.limit()))
+        })
+    }
+}
+
+/// Brings the hits found in a block to a visitor.
+#[inline(always)]
+fn bring(
+    found: &Found,
+    block: &Block,
+    instance: u32,
+    ray: &Prepared,
+    visitor: &mut impl Visitor,
+) -> ControlFlow<()> {
+    let mut mask = found.mask;
+    while mask != 0 {
+        let lane = mask.trailing_zeros() as usize & 7;
+        mask &= mask - 1;
+        visitor.hit(Hit {
+            t: ray.outward(found.t.0[lane]),
+            instance,
+            triangle: block.id(lane),
+            barycentric: Vec2::new(found.second.0[lane], found.third.0[lane]),
+        })?;
+    }
+    ControlFlow::Continue(())
 }
 
 /// What is done with the hits of one ray.

@@ -11,6 +11,7 @@ mod collapse;
 pub mod instance;
 mod lanes;
 pub mod mesh;
+pub mod moment;
 mod prepared;
 pub mod ray;
 pub mod surface_point;
