@@ -3,7 +3,7 @@
 use crate::gltf::bundle::Bundle;
 use crate::gltf::error::LoadError;
 use crate::gltf::limits::Limits;
-use crate::gltf::load::load;
+use crate::gltf::load::load_while;
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
 use crate::scene::data::SceneData;
@@ -46,7 +46,8 @@ pub fn prepare(
     environment: Option<&[u8]>,
     settings: &Settings,
 ) -> Result<Scene, PrepareError> {
-    let loaded = load(&Bundle::open(bytes)?, &Limits::default())?;
+    let times = [settings.shutter.open, settings.shutter.close];
+    let loaded = load_while(&Bundle::open(bytes)?, &Limits::default(), times)?;
     let data = loaded.scene;
     let views = views(&data, settings)?;
     let given = match &settings.environment {

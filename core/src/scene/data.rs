@@ -52,7 +52,7 @@ impl SceneData {
     /// Whether an instance moves or changes its shape.
     pub fn moves(&self, instance: u32) -> bool {
         let Instance { mesh, placement, .. } = &self.instances[instance as usize];
-        !placement.knots().is_empty() || !self.meshes[mesh.index()].shapes.is_empty()
+        !placement.knots().is_empty() || !self.meshes[mesh.index()].forms.is_empty()
     }
 
     /// Name of the node that a triangle of an instance comes from; may be empty.

@@ -41,12 +41,12 @@ pub struct Mesh {
     pub parts: Vec<Part>,
     /// Its shape at the second knot of the scene's motion and all further ones; empty where the shape stays. At the
     /// first knot it has the shape above.
-    pub shapes: Vec<Shape>,
+    pub forms: Vec<Form>,
 }
 
 /// A mesh's shape at a knot: as many entries as the mesh has, each.
 #[derive(Clone, Debug, Default)]
-pub struct Shape {
+pub struct Form {
     /// Corners.
     pub positions: Vec<Vec3>,
     /// Shading normals; zero where the triangle is flat.
@@ -69,30 +69,30 @@ impl Mesh {
     #[inline]
     pub fn corners(&self, triangle: u32, moment: Moment) -> [Vec3; 3] {
         let corners = self.triangles[triangle as usize].map(|v| v as usize);
-        if self.shapes.is_empty() {
+        if self.forms.is_empty() {
             return corners.map(|v| self.positions[v]);
         }
-        let [a, b] = self.around(moment, |mesh| &mesh.positions, |shape| &shape.positions);
+        let [a, b] = self.around(moment, |mesh| &mesh.positions, |form| &form.positions);
         corners.map(|v| moment.vector(a[v], b[v]))
     }
 
     /// Shading normals of three vertices at a moment, of any length; the mesh must have normals.
     #[inline]
     pub fn normals(&self, vertices: [usize; 3], moment: Moment) -> [Vec3; 3] {
-        if self.shapes.is_empty() {
+        if self.forms.is_empty() {
             return vertices.map(|v| self.normals[v]);
         }
-        let [a, b] = self.around(moment, |mesh| &mesh.normals, |shape| &shape.normals);
+        let [a, b] = self.around(moment, |mesh| &mesh.normals, |form| &form.normals);
         vertices.map(|v| moment.vector(a[v], b[v]))
     }
 
     /// Tangents of three vertices at a moment, of any length; the mesh must have tangents.
     #[inline]
     pub fn tangents(&self, vertices: [usize; 3], moment: Moment) -> [Vec4; 3] {
-        if self.shapes.is_empty() {
+        if self.forms.is_empty() {
             return vertices.map(|v| self.tangents[v]);
         }
-        let [a, b] = self.around(moment, |mesh| &mesh.tangents, |shape| &shape.tangents);
+        let [a, b] = self.around(moment, |mesh| &mesh.tangents, |form| &form.tangents);
         vertices.map(|v| moment.vector(a[v].truncate(), b[v].truncate()).extend(a[v].w))
     }
 
@@ -101,10 +101,10 @@ impl Mesh {
         &'a self,
         moment: Moment,
         first: fn(&'a Self) -> &'a Vec<T>,
-        later: fn(&'a Shape) -> &'a Vec<T>,
+        later: fn(&'a Form) -> &'a Vec<T>,
     ) -> [&'a [T]; 2] {
         let knot = |index: usize| {
-            let shape = index.min(self.shapes.len()).checked_sub(1).map(|i| &self.shapes[i]);
+            let shape = index.min(self.forms.len()).checked_sub(1).map(|i| &self.forms[i]);
             shape.map_or(first(self).as_slice(), |shape| later(shape).as_slice())
         };
         [knot(moment.piece as usize), knot(moment.piece as usize + 1)]
@@ -112,11 +112,11 @@ impl Mesh {
 
     /// The tree that rays walk.
     pub fn tree(&self) -> Result<MeshTree, BuildError> {
-        if self.shapes.is_empty() {
+        if self.forms.is_empty() {
             return MeshTree::build(&self.positions, &self.triangles);
         }
         let first = std::iter::once(self.positions.as_slice());
-        let knots: Vec<&[Vec3]> = first.chain(self.shapes.iter().map(|s| s.positions.as_slice())).collect();
+        let knots: Vec<&[Vec3]> = first.chain(self.forms.iter().map(|s| s.positions.as_slice())).collect();
         MeshTree::moving(&knots, &self.triangles)
     }
 
@@ -128,10 +128,10 @@ impl Mesh {
 
     /// Memory that the lists take.
     pub fn bytes(&self) -> usize {
-        let shape = |s: &Shape| {
+        let size = |s: &Form| {
             (s.positions.len() + s.normals.len()) * size_of::<Vec3>() + s.tangents.len() * size_of::<Vec4>()
         };
-        self.shapes.iter().map(shape).sum::<usize>()
+        self.forms.iter().map(size).sum::<usize>()
             + self.positions.len() * size_of::<Vec3>()
             + self.triangles.len() * size_of::<[u32; 3]>()
             + self.materials.len() * size_of::<MaterialId>()
