@@ -4,8 +4,9 @@ use crate::gltf::animation::Animation;
 use crate::gltf::geometry::Geometry;
 use crate::gltf::nodes::{Pose, Tree};
 use crate::gltf::shapes::{Morphs, Shape, Skins};
+use crate::gltf::skin::Influences;
 use crate::scene::bounds::Bounds;
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 
 /// Things of one kind that are looked at: a choice of those that there are.
 const LOOKED_AT: usize = 4096;
@@ -42,7 +43,10 @@ impl<'a> Probes<'a> {
         for shape in shapes {
             let bounds = shape.bounds();
             for &place in &shape.places {
-                let there = bounds.transformed(&tree.world(place, opening));
+                let there = match shape.skin {
+                    Some(skin) => skinned_bounds(shape, &skins[&skin].joints(tree, opening)),
+                    None => bounds.transformed(&tree.world(place, opening)),
+                };
                 all = all.union(there);
                 if shape.morphs == Morphs::Yes && !there.is_empty() {
                     morphing.push((tree.nodes[place].index, there.radius()));
@@ -90,10 +94,7 @@ impl<'a> Probes<'a> {
                 Some((index, joints)) if index == skin => joints,
                 _ => self.skins[&skin].joints(tree, pose),
             };
-            let step = geometry.positions.len().div_ceil(VERTICES).max(1);
-            for (v, position) in geometry.positions.iter().enumerate().step_by(step) {
-                points.push(influences.transform(v, &joints).transform_point3(position.as_dvec3()));
-            }
+            points.extend(vertices(geometry, influences, &joints));
             known = Some((skin, joints));
         }
         // A target is taken to move its mesh by its radius.
@@ -112,6 +113,26 @@ impl<'a> Probes<'a> {
         }
         points
     }
+}
+
+/// Where some of a geometry's vertices are taken by its joints.
+fn vertices<'a>(
+    geometry: &'a Geometry,
+    influences: &'a Influences,
+    joints: &'a [DAffine3],
+) -> impl Iterator<Item = DVec3> + 'a {
+    let step = geometry.positions.len().div_ceil(VERTICES).max(1);
+    (geometry.positions.iter().enumerate().step_by(step))
+        .map(|(v, position)| influences.transform(v, joints).transform_point3(position.as_dvec3()))
+}
+
+fn skinned_bounds(shape: &Shape, joints: &[DAffine3]) -> Bounds {
+    let mut bounds = Bounds::EMPTY;
+    for geometry in &shape.geometries {
+        let hanging = geometry.influences.iter().flat_map(|i| vertices(geometry, i, joints));
+        hanging.for_each(|point| bounds.include(point));
+    }
+    bounds
 }
 
 /// At most [`LOOKED_AT`] of a list, spread over it.

@@ -298,3 +298,85 @@ impl<P: Fn(&Hit) -> f32> Visitor for Product<P> {
         if self.value == 0.0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::{Quat, Vec3};
+
+    /// Numbers that look random.
+    fn noise(i: u32) -> f32 {
+        let z = i.wrapping_mul(0x9e37_79b9) ^ 0x85eb_ca6b;
+        let z = (z ^ (z >> 15)).wrapping_mul(0x2c1b_3c6d);
+        (z ^ (z >> 12)) as f32 / u32::MAX as f32 * 2.0 - 1.0
+    }
+
+    fn cloud(seed: u32, count: u32, size: f32) -> Vec<Vec3> {
+        let point = |i: u32| Vec3::new(noise(i), noise(i + 7919), noise(i + 104_729));
+        (0..count).map(|i| point(seed + i / 3) + point(seed + i + 50_000) * size).collect()
+    }
+
+    fn rays(moment: Moment) -> impl Iterator<Item = Ray> {
+        (0..400).map(move |i| {
+            let origin = Vec3::new(noise(3 * i), noise(3 * i + 1), noise(3 * i + 2)) * 3.0;
+            let target = Vec3::new(noise(5 * i + 9), noise(5 * i + 11), noise(5 * i + 12)) * 0.7;
+            Ray::new(origin, target - origin).at(moment)
+        })
+    }
+
+    /// A mesh that changes its shape has, at every moment, the hits of a mesh that always had that shape: the same bits.
+    #[test]
+    fn a_shape_between_knots_is_hit_as_if_it_stood_still() {
+        let triangles: Vec<[u32; 3]> = (0..300).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+        let knots = [cloud(1, 900, 0.2), cloud(2, 900, 0.3), cloud(77, 900, 0.1)];
+        let moving = MeshTree::moving(&[&knots[0], &knots[1], &knots[2]], &triangles).unwrap();
+        let identity = [Placement { mesh: 0, to_world: Affine3A::IDENTITY }];
+        let moving = Aggregate::build(vec![moving], &identity).unwrap();
+        let mut hits = 0;
+        for (piece, passed) in [(0, 0.0), (0, 0.37), (0, 0.999), (1, 0.0), (1, 0.5)] {
+            let moment = Moment { piece, passed };
+            let [a, b] = moment.ends(&knots);
+            let now: Vec<Vec3> = a.iter().zip(b).map(|(a, b)| moment.vector(*a, *b)).collect();
+            let still = MeshTree::build(&now, &triangles).unwrap();
+            let still = Aggregate::build(vec![still], &identity).unwrap();
+            for ray in rays(moment) {
+                let hit = moving.closest(&ray, |_| true);
+                assert_eq!(hit, still.closest(&ray, |_| true));
+                assert_eq!(moving.occluded(&ray, |_| true), hit.is_some());
+                hits += usize::from(hit.is_some());
+            }
+        }
+        assert!((200..1800).contains(&hits), "{hits} hits: the test sees too little");
+    }
+
+    /// An instance that moves is hit, at every moment, as one that always stood there: the same bits.
+    #[test]
+    fn an_instance_between_knots_is_hit_as_if_it_stood_there() {
+        let triangles: Vec<[u32; 3]> = (0..100).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+        let tree = MeshTree::build(&cloud(5, 300, 0.4), &triangles).unwrap();
+        let knots: Vec<Affine3A> = (0..4)
+            .map(|i| {
+                let turn = Quat::from_rotation_z(0.6 * i as f32) * Quat::from_rotation_x(0.2 * i as f32);
+                let scale = Vec3::new(0.5, 0.4 + 0.1 * i as f32, 0.3);
+                Affine3A::from_scale_rotation_translation(scale, turn, Vec3::new(0.3 * i as f32, -0.2, 0.1))
+            })
+            .collect();
+        let first = Placement { mesh: 0, to_world: knots[0] };
+        let moving = Aggregate::moving(vec![tree.clone()], &[first, first], |i| {
+            if i == 0 { knots.as_slice() } else { &[] }
+        });
+        let moving = moving.unwrap();
+        let mut hits = 0;
+        for (piece, passed) in [(0, 0.25), (1, 0.0), (2, 0.5), (2, 0.999)] {
+            let moment = Moment { piece, passed };
+            let there = Placement { mesh: 0, to_world: moment.transform(&knots) };
+            let still = Aggregate::build(vec![tree.clone()], &[there, first]).unwrap();
+            for ray in rays(moment) {
+                let hit = moving.closest(&ray, |_| true);
+                assert_eq!(hit, still.closest(&ray, |_| true));
+                hits += usize::from(hit.is_some_and(|hit| hit.instance == 0));
+            }
+        }
+        assert!(hits > 150, "{hits} hits: the test sees too little");
+    }
+}
