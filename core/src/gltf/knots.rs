@@ -10,9 +10,9 @@ use crate::gltf::stage::Stage;
 use crate::scene::knots::Knots;
 use glam::DVec3;
 
-/// Pieces are cut until the motion strays from them by at most this share of the scene's radius: a sixteenth of a pixel
+/// Pieces are cut until the motion strays from them by at most this share of the scene's radius: an eighth of a pixel
 /// where the scene fills a picture of 1000.
-const TOLERANCE: f64 = 1.0 / 8192.0;
+const TOLERANCE: f64 = 1.0 / 4096.0;
 
 /// Most pieces.
 const PIECES: usize = 64;
@@ -75,7 +75,8 @@ pub(crate) fn stage<'a>(
     if tree.movers.is_empty() && !morphs {
         return Ok(Stage::new(tree, skins, Knots::STILL, vec![opening]));
     }
-    let probes = Probes::new(tree, animation, shapes, skins, &opening);
+    let closing = tree.pose(animation, Instant { time: times[1], side: Side::Before })?;
+    let probes = Probes::new(tree, animation, shapes, skins, [&opening, &closing]);
     let tolerance = TOLERANCE * probes.radius;
     let shortest = SHORTEST * (times[1] - times[0]);
     let breaks = breaks(animation, tree, times);

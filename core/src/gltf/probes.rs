@@ -25,29 +25,30 @@ pub(crate) struct Probes<'a> {
     /// Places of cameras and lights that move.
     looking: Vec<usize>,
     skins: &'a Skins,
-    /// Radius of the scene in metres.
+    /// Radius of what the scene holds when the shutter opens and when it closes, in metres.
     pub(crate) radius: f64,
 }
 
 impl<'a> Probes<'a> {
-    /// For a tree and the shapes in it.
+    /// For a tree and the shapes in it; `ends` are the poses when the shutter opens and closes.
     pub(crate) fn new(
         tree: &Tree<'_>,
         animation: &Animation<'_>,
         shapes: &'a [Shape],
         skins: &'a Skins,
-        opening: &Pose,
+        ends: [&Pose; 2],
     ) -> Self {
         let (mut rigid, mut skinned, mut morphing) = (Vec::new(), Vec::new(), Vec::new());
         let mut all = Bounds::EMPTY;
         for shape in shapes {
             let bounds = shape.bounds();
             for &place in &shape.places {
-                let there = match shape.skin {
-                    Some(skin) => skinned_bounds(shape, &skins[&skin].joints(tree, opening)),
-                    None => bounds.transformed(&tree.world(place, opening)),
+                let at = |pose: &Pose| match shape.skin {
+                    Some(skin) => skinned_bounds(shape, &skins[&skin].joints(tree, pose)),
+                    None => bounds.transformed(&tree.world(place, pose)),
                 };
-                all = all.union(there);
+                let there = at(ends[0]);
+                all = all.union(there).union(at(ends[1]));
                 if shape.morphs == Morphs::Yes && !there.is_empty() {
                     morphing.push((tree.nodes[place].index, there.radius()));
                 }
