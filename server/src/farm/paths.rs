@@ -18,10 +18,12 @@ const LAYERS_MAX: usize = RULES_MAX - 1;
 const NAME_MAX: usize = 64;
 /// Names that a picture's channels or its parts have already.
 const TAKEN: [&str; 5] = ["R", "G", "B", "error", "picture"];
+/// What a layer of `photon` shows that is gathered from half the area.
+const NARROW: &str = "narrow";
 /// Vertices of either subpath of a technique.
 const VERTICES_MAX: u32 = 255;
 /// Methods that this version renders by.
-const RENDERED: [Method; 3] = [Method::Path, Method::Light, Method::Bidirectional];
+const RENDERED: [Method; 4] = [Method::Path, Method::Light, Method::Bidirectional, Method::Photon];
 
 /// What a job shows, and how.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,8 +44,8 @@ pub struct Chosen {
     pub weights: Weights,
 }
 
-/// Resolves what a request says of paths; tells `note` of each fault and its JSON pointer.
-pub fn choose(request: &JobRequest, note: &mut impl FnMut(&str, String)) -> Chosen {
+/// Resolves what a request says of paths, and their language; tells `note` of each fault and its JSON pointer.
+pub fn choose(request: &JobRequest, note: &mut impl FnMut(&str, String)) -> (Chosen, Option<Language>) {
     let (pointer, paths, gloss) = picture(request, note);
     let method = method(request, note);
     let chosen = Chosen {
@@ -55,10 +57,11 @@ pub fn choose(request: &JobRequest, note: &mut impl FnMut(&str, String)) -> Chos
         gloss,
         method,
     };
-    if let Some(language) = compile(&chosen, pointer, note) {
-        fits(request, &chosen, &language, pointer, note);
+    let language = compile(&chosen, pointer, note);
+    if let Some(language) = &language {
+        fits(request, &chosen, language, pointer, note);
     }
-    chosen
+    (chosen, language)
 }
 
 /// Where the picture's expression is written, the expression, and what it does to gloss.
@@ -131,7 +134,7 @@ fn at_layer(number: usize) -> String {
     format!("/layers/{number}")
 }
 
-/// `NAME=EXPR` or `NAME=(s,t)`.
+/// `NAME=EXPR`, `NAME=(s,t)` or `NAME=narrow`.
 fn layer(text: &str) -> Result<Layer, String> {
     let (name, shows) =
         text.split_once('=').ok_or_else(|| "a layer is written NAME=EXPR, such as direct=LDE".to_owned())?;
@@ -144,6 +147,9 @@ fn layer(text: &str) -> Result<Layer, String> {
         return Err(format!("a layer cannot be named '{name}': a picture has that already"));
     }
     let inside = shows.trim().strip_prefix('(').and_then(|rest| rest.strip_suffix(')'));
+    if shows.trim() == NARROW {
+        return Ok(Layer { name: name.to_owned(), shows: Shows::Narrow });
+    }
     let shows = match inside.filter(|inside| inside.trim_start().starts_with(|c: char| c.is_ascii_digit())) {
         Some(pair) => Shows::Strategy(strategy(pair)?),
         None => Shows::Paths(shows.to_owned()),
@@ -185,7 +191,7 @@ fn strategy(text: &str) -> Result<Strategy, String> {
 fn compile(chosen: &Chosen, picture: &str, note: &mut impl FnMut(&str, String)) -> Option<Language> {
     let layers = chosen.layers.iter().enumerate().filter_map(|(i, layer)| match &layer.shows {
         Shows::Paths(paths) => Some((at_layer(i), paths.as_str())),
-        Shows::Strategy(_) => None,
+        Shows::Strategy(_) | Shows::Narrow => None,
     });
     let rules: Vec<(String, &str)> =
         std::iter::once((picture.to_owned(), chosen.paths.as_str())).chain(layers).collect();
@@ -233,6 +239,14 @@ fn fits(
         for (i, layer) in chosen.layers.iter().enumerate() {
             if matches!(layer.shows, Shows::Strategy(_)) {
                 note(&at_layer(i), needs("layers of a technique"));
+            }
+        }
+    }
+    if method != Method::Photon {
+        for (i, layer) in chosen.layers.iter().enumerate() {
+            if layer.shows == Shows::Narrow {
+                let name = method.name();
+                note(&at_layer(i), format!("'{NARROW}' is a layer of method 'photon', this is '{name}'"));
             }
         }
     }
