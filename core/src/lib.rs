@@ -8,6 +8,7 @@ pub mod gltf;
 pub mod math;
 pub mod method;
 pub mod path;
+pub mod radiosity;
 pub mod render;
 pub mod sampler;
 pub mod scene;

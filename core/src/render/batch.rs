@@ -4,10 +4,11 @@ use crate::film::batch::Batch;
 use crate::film::invalid::InvalidSamples;
 use crate::film::size::Region;
 use crate::film::sum::{Plane, Sum};
-use crate::method::path;
+use crate::method::radiosity::Reconstruction;
+use crate::method::{path, radiosity};
+use crate::render::prepare::Prepared;
 use crate::render::progress::Progress;
 use crate::sampler::Sampler;
-use crate::scene::Scene;
 use crate::settings::{Method, Settings};
 use rayon::prelude::*;
 
@@ -21,13 +22,18 @@ pub struct Stopped;
 
 /// The sum of a batch. Runs on the current rayon pool; the same arguments give the same bits on any number of threads:
 /// a pixel's samples are added in f64 in the order of their indices, by one thread.
-pub fn render(scene: &Scene, settings: &Settings, batch: Batch, progress: &Progress) -> Result<Sum, Stopped> {
+pub fn render(
+    prepared: &Prepared,
+    settings: &Settings,
+    batch: Batch,
+    progress: &Progress,
+) -> Result<Sum, Stopped> {
     assert!(batch.region.is_in(settings.size), "the batch's region is not in the frame");
     let tiles = tiles(batch.region);
     progress.begin(batch.region.pixels() as u64);
     let done = tiles
         .par_iter()
-        .map(|tile| render_tile(scene, settings, batch, *tile, progress))
+        .map(|tile| render_tile(prepared, settings, batch, *tile, progress))
         .collect::<Result<Vec<_>, Stopped>>()?;
     let mut plane: Plane = vec![[0.0; 3]; batch.region.pixels()];
     let (mut invalid, mut rays) = (InvalidSamples::default(), 0);
@@ -52,12 +58,13 @@ struct Tile {
 }
 
 fn render_tile(
-    scene: &Scene,
+    prepared: &Prepared,
     settings: &Settings,
     batch: Batch,
     region: Region,
     progress: &Progress,
 ) -> Result<Tile, Stopped> {
+    let scene = &prepared.scene;
     let mut tile =
         Tile { pixels: Vec::with_capacity(region.pixels()), invalid: InvalidSamples::default(), rays: 0 };
     for y in region.y..region.y + region.height {
@@ -70,6 +77,11 @@ fn render_tile(
                 let sampler = Sampler::new(settings.seed, batch.replicate, [x, y], index);
                 let value = match settings.method {
                     Method::Path => path::sample(scene, settings, [x, y], &sampler, &mut tile.rays),
+                    Method::Radiosity => {
+                        let solution = prepared.radiosity.as_ref().expect("prepared for this method");
+                        let how = Reconstruction::Gather;
+                        radiosity::sample(scene, solution, settings, how, [x, y], &sampler, &mut tile.rays)
+                    }
                     other => unreachable!("{} is refused when a job is submitted", other.name()),
                 };
                 sum += tile.invalid.checked(value).as_dvec3();
