@@ -5,5 +5,6 @@
 mod bad_input;
 mod closed_forms;
 mod faults;
+mod radiosity;
 mod same_bits;
 mod tidy;

@@ -142,7 +142,12 @@ pub fn coloured_lambert(rgb: [f32; 3]) -> Value {
 }
 
 /// Adds a body of its own node, mesh and material.
-pub fn add(glb: &mut Glb, name: &str, mut material: Value, (positions, triangles): (Vec<Vec3>, Vec<[u32; 3]>)) {
+pub fn add(
+    glb: &mut Glb,
+    name: &str,
+    mut material: Value,
+    (positions, triangles): (Vec<Vec3>, Vec<[u32; 3]>),
+) {
     material["name"] = json!(name);
     let material = glb.material(material);
     let mesh = glb.mesh(&positions, &triangles, material);

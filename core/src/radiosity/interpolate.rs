@@ -178,3 +178,87 @@ fn weight(patch: &Patch, corner: usize) -> f64 {
     let angle = libm::atan2(a.cross(b).length(), a.dot(b));
     angle.max(1e-6) / (a + b).length().max(f64::MIN_POSITIVE)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::instance::{Instance, Placement};
+    use crate::scene::material::{Material, MaterialId};
+    use crate::scene::mesh::{Mesh, MeshId};
+
+    /// A square and, at right angles on its edge x = 1, another.
+    fn corner() -> SceneData {
+        let p = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [1, 0, 1], [1, 1, 1]];
+        let mesh = Mesh {
+            positions: p.map(|p| Vec3::from_array(p.map(|v| v as f32))).to_vec(),
+            triangles: vec![[0, 1, 2], [0, 2, 3], [1, 4, 5], [1, 5, 2]],
+            materials: vec![MaterialId(0); 4],
+            ..Mesh::default()
+        };
+        let instance = Instance { mesh: MeshId(0), name: String::new(), placement: Placement::World };
+        let materials = vec![Material::default()];
+        SceneData { meshes: vec![mesh], instances: vec![instance], materials, ..SceneData::empty() }
+    }
+
+    #[test]
+    fn sides_and_creases_are_kept_apart_and_coplanar_triangles_are_not() {
+        let data = corner();
+        let patches = Patches::of_triangles(&data);
+        let vertices = Vertices::new(&data, &patches);
+        // Four corners of each square on each of its sides.
+        assert_eq!(vertices.count(), 16);
+        let front = |p: u32| vertices.of(Element(2 * p));
+        assert_eq!(front(0)[0], front(1)[0]);
+        assert_eq!(front(0)[2], front(1)[1]);
+        assert_ne!(front(0)[1], front(2)[0]);
+        assert_ne!(front(0)[1], vertices.of(Element(1))[1]);
+    }
+
+    #[test]
+    fn a_fine_patch_beside_a_coarse_one_leaves_no_step() {
+        let data = corner();
+        let mut patches = Patches::of_triangles(&data);
+        patches.cut(&[true, false, false, false]);
+        let first = patches.at(0, 0, Vec2::new(0.1, 0.1)).0.index();
+        let chosen: Vec<bool> = (0..patches.all().len()).map(|i| i == first).collect();
+        patches.cut(&chosen);
+        let vertices = Vertices::new(&data, &patches);
+        let elements: Vec<DVec3> =
+            (0..2 * patches.all().len()).map(|e| DVec3::splat((e * e % 17) as f64)).collect();
+        let values = vertices.values(&patches, &elements);
+        let at = |triangle: u32, weights: Vec2| {
+            let (patch, local) = patches.at(0, triangle, weights);
+            let v = vertices.of(Element(2 * patch.0)).map(|v| values[v as usize]);
+            v[0] * (1.0 - local.x - local.y) + v[1] * local.x + v[2] * local.y
+        };
+        // Along the diagonal from (0, 0) to (1, 1): the third corner's edge of triangle 0, the second's of triangle 1.
+        for i in 0..=64 {
+            let t = i as f32 / 64.0;
+            let (a, b) = (at(0, Vec2::new(0.0, t)), at(1, Vec2::new(t, 0.0)));
+            assert!((a - b).length() < 1e-4, "{t}: {a} {b}");
+        }
+        let coarse =
+            Element::new(patches.at(0, 1, Vec2::new(0.5, 0.2)).0, crate::scene::interaction::Side::Front);
+        let around = vertices.around(&data, &patches, coarse);
+        // Three corners, the middle of the diagonal and that of its half.
+        assert_eq!(around.len(), 5);
+        let whole: f32 = (0..around.len())
+            .map(|i| {
+                let (a, b) = (around[i].1, around[(i + 1) % around.len()].1);
+                a.perp_dot(b)
+            })
+            .sum();
+        assert!((whole - 1.0).abs() < 1e-6, "they go around the triangle once");
+    }
+
+    #[test]
+    fn what_is_the_same_everywhere_stays_so() {
+        let data = corner();
+        let patches = Patches::even(&data, 100);
+        let vertices = Vertices::new(&data, &patches);
+        let elements = vec![DVec3::splat(0.3); 2 * patches.all().len()];
+        for value in vertices.values(&patches, &elements) {
+            assert!((value - 0.3).abs().max_element() < 1e-6);
+        }
+    }
+}

@@ -1,7 +1,7 @@
 //! Triangles of a scene, cut into patches.
 
 use crate::scene::data::SceneData;
-use glam::{DVec3, Vec2, Vec3};
+use glam::{Vec2, Vec3};
 
 /// A triangle is halved at most this often: f32 then still tells the corners of its patches apart.
 const LEVEL_MAX: u8 = 12;
@@ -199,10 +199,68 @@ impl Patches {
     pub fn area(&self) -> f64 {
         self.all.iter().map(Patch::area).sum()
     }
+}
 
-    /// The area around a patch's normal, by winding in the mesh's order; of any length.
-    pub fn winding_normal(patch: &Patch) -> DVec3 {
-        let [a, b, c] = patch.corners.map(Vec3::as_dvec3);
-        (b - a).cross(c - a)
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::instance::{Instance, Placement};
+    use crate::scene::material::{Material, MaterialId};
+    use crate::scene::mesh::{Mesh, MeshId};
+
+    fn square() -> SceneData {
+        let mesh = Mesh {
+            positions: vec![Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Y],
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+            materials: vec![MaterialId(0); 2],
+            ..Mesh::default()
+        };
+        let instance = Instance { mesh: MeshId(0), name: String::new(), placement: Placement::World };
+        let materials = vec![Material::default()];
+        SceneData { meshes: vec![mesh], instances: vec![instance], materials, ..SceneData::empty() }
+    }
+
+    #[test]
+    fn a_point_lies_on_the_patch_that_is_found_for_it() {
+        let mut patches = Patches::even(&square(), 32);
+        assert_eq!(patches.all().len(), 32);
+        let chosen: Vec<bool> = (0..32).map(|i| i % 3 == 0).collect();
+        patches.cut(&chosen);
+        assert_eq!(patches.all().len(), 32 + 11 * 3);
+        assert!((patches.area() - 1.0).abs() < 1e-6);
+        let mut seen = vec![false; patches.all().len()];
+        for i in 0..=40 {
+            for j in 0..=40 - i {
+                let weights = Vec2::new(i as f32, j as f32) / 40.0;
+                let (id, local) = patches.at(0, 1, weights);
+                let patch = &patches.all()[id.index()];
+                seen[id.index()] = true;
+                assert_eq!(patch.triangle, 1);
+                assert!(local.min_element() >= -1e-6 && local.x + local.y <= 1.0 + 1e-6, "{weights} {local}");
+                assert!((patch.on_triangle(local) - weights).length() < 1e-6);
+                let [a, b, c] = patch.corners;
+                let point = a + (b - a) * local.x + (c - a) * local.y;
+                let truth = Vec3::new(1.0, 1.0, 0.0) * weights.x + Vec3::Y * weights.y;
+                assert!((point - truth).length() < 1e-6);
+            }
+        }
+        let of_second = patches.all().iter().zip(&seen).filter(|(p, _)| p.triangle == 1);
+        assert!(of_second.into_iter().all(|(_, seen)| *seen));
+    }
+
+    #[test]
+    fn winding_is_kept() {
+        let patches = Patches::even(&square(), 128);
+        for patch in patches.all() {
+            let [a, b, c] = patch.corners;
+            assert!((b - a).cross(c - a).z > 0.0);
+        }
+    }
+
+    #[test]
+    fn no_number_of_patches_cuts_without_end() {
+        for count in [0, 1, 3, 1 << 16] {
+            assert!(Patches::even(&square(), count).all().len() <= count.max(2));
+        }
     }
 }
