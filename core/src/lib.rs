@@ -2,6 +2,7 @@
 //!
 //! The rooms, bottom to top; a room uses only those above it in this list.
 
+pub mod bake;
 pub mod bsdf;
 pub mod film;
 pub mod gltf;
