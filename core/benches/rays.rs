@@ -169,8 +169,8 @@ impl Scene {
         hits.map(|(ray, hit)| {
             let mesh = &self.meshes[self.placements[hit.instance as usize].mesh as usize];
             let vertices = mesh.triangles[hit.triangle as usize].map(|v| mesh.positions[v as usize]);
-            let instance = &self.placed.instances()[hit.instance as usize];
-            let mut point = SurfacePoint::new(vertices, hit.barycentric, instance);
+            let moved = self.placed.instances()[hit.instance as usize].moved.as_ref();
+            let mut point = SurfacePoint::new(vertices, hit.barycentric, moved);
             if point.normal.dot(ray.direction) > 0.0 {
                 point.normal = -point.normal;
             }

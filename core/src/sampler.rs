@@ -23,6 +23,23 @@ pub enum Dimension {
     Lens,
     /// At the n-th scattering of the eye subpath, from 0.
     Eye(u32, Use),
+    /// At the start of a light subpath.
+    Start(StartUse),
+    /// At the n-th scattering of a light subpath, from 0. Light subpaths have samplers of their own: [`Sampler::light`].
+    Light(u32, Use),
+}
+
+/// What a number is used for at the start of a light subpath.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StartUse {
+    /// Choice of light, and of its side.
+    Choice,
+    /// Place on it, or direction of the sky.
+    Place,
+    /// Direction it leaves in, or place on the disk that light from afar passes through.
+    Direction,
+    /// Place on the lens that sees the light itself.
+    Lens,
 }
 
 /// What a number is used for at a scattering.
@@ -38,8 +55,12 @@ pub enum Use {
     LightPoint,
     /// Whether what is partly transparent is hit, on the way there.
     Alpha,
+    /// Place on the lens.
+    Lens,
 }
 
+/// Keeps light subpaths apart from the pixel's own numbers.
+const LIGHT: u64 = 0x6c69_6768_7473;
 /// Dimensions before the first scattering.
 const FIRST_SCATTERING: u32 = 4;
 /// Dimensions a scattering.
@@ -50,7 +71,8 @@ impl Dimension {
         match self {
             Self::Film => 0,
             Self::Lens => 1,
-            Self::Eye(n, what) => FIRST_SCATTERING + SCATTERING * n + what as u32,
+            Self::Start(what) => what as u32,
+            Self::Eye(n, what) | Self::Light(n, what) => FIRST_SCATTERING + SCATTERING * n + what as u32,
         }
     }
 }
@@ -60,6 +82,13 @@ impl Sampler {
     pub fn new(seed: u64, replicate: u32, pixel: [u32; 2], index: u32) -> Self {
         let place = u64::from(pixel[0]) << 32 | u64::from(pixel[1]);
         Self { key: mix(mix(mix(seed) ^ place) ^ u64::from(replicate)), index }
+    }
+
+    /// The numbers of a light subpath of a replicate. The indices of all subpaths of a frame form one sequence, so that what
+    /// leaves the lights is spread over the whole frame, not pixel by pixel.
+    pub fn light(seed: u64, replicate: u32, index: u64) -> Self {
+        let far = mix(mix(seed ^ LIGHT) ^ (index >> 32));
+        Self { key: mix(far ^ u64::from(replicate)), index: index as u32 }
     }
 
     /// Two numbers in [0, 1), well spread over the indices of a pixel.

@@ -2,6 +2,7 @@
 
 use crate::film::size::Size;
 use serde::{Deserialize, Serialize};
+use std::fmt;
 
 /// The whole rendering equation.
 pub const FULL: &str = "L(D|S)*E";
@@ -79,6 +80,18 @@ impl Method {
             Self::Radiosity => "radiosity",
         }
     }
+
+    /// Whether a sample of one pixel can add light to any other, so that a batch is always the whole picture.
+    pub fn splats(self) -> bool {
+        matches!(self, Self::Light | Self::Bidirectional | Self::Photon)
+    }
+}
+
+impl Settings {
+    /// Planes of a sum: the picture and its layers.
+    pub fn planes(&self) -> u32 {
+        1 + self.layers.len() as u32
+    }
 }
 
 /// A further picture.
@@ -98,6 +111,19 @@ pub enum Shows {
     Paths(String),
     /// What one technique of `bidirectional` adds to the picture, weight included.
     Strategy(Strategy),
+    /// The picture of `photon` with half the area of gathering: the difference tells its bias.
+    Narrow,
+}
+
+impl fmt::Display for Shows {
+    /// As on the command line.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Paths(paths) => f.write_str(paths),
+            Self::Strategy(Strategy { s, t }) => write!(f, "({s},{t})"),
+            Self::Narrow => f.write_str("half the area of gathering"),
+        }
+    }
 }
 
 /// A technique: how many vertices of a path come from the light, and how many from the eye, light and lens included.

@@ -21,6 +21,17 @@ pub struct CurveRow {
     pub relative_error_upper: Option<f64>,
 }
 
+/// One layer at a checkpoint. Errors are absent where there is a single replicate.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LayerError {
+    /// Mean luminance over the pixels.
+    pub mean_luminance: f64,
+    /// As of the picture.
+    pub rms_error: Option<f64>,
+    /// As of the picture, by the layer's own luminance.
+    pub relative_error: Option<f64>,
+}
+
 /// The whole curve of a job.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Curve {

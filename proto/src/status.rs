@@ -1,7 +1,7 @@
 //! How jobs and workers stand.
 
 use crate::{
-    curve::CurveRow,
+    curve::{CurveRow, LayerError},
     id::{BlobId, JobId, WorkerId},
     job::JobRequest,
 };
@@ -107,6 +107,9 @@ pub struct JobStatus {
     pub method_reason: String,
     /// The path expression.
     pub paths: String,
+    /// Its layers in order.
+    #[serde(default)]
+    pub layers: Vec<LayerStatus>,
     /// What is rendered, resolved.
     pub settings: Settings,
     /// Pixels that are rendered.
@@ -115,6 +118,18 @@ pub struct JobStatus {
     pub request: JobRequest,
     /// What the scene lacked or could not be read, and what was done about it.
     pub warnings: Vec<String>,
+}
+
+/// A layer of a job, seen from outside.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LayerStatus {
+    /// Its name.
+    pub name: String,
+    /// What it shows: a path expression, or a technique `(s,t)`.
+    pub shows: String,
+    /// At the latest checkpoint.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub error: Option<LayerError>,
 }
 
 /// A worker, seen from outside.

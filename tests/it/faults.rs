@@ -13,7 +13,7 @@ const SAMPLES: u32 = 256;
 /// What `core` alone says of the room at 96×54: the picture's channels and its error's.
 fn undisturbed() -> Layers {
     let picture = rendered(&room(), &settings(96, 54, 4), SAMPLES / 4).picture();
-    let error = picture.error.as_ref().expect("four replicates");
+    let error = picture.errors.first().expect("four replicates");
     let mut layers = Layers { width: 96, height: 54, ..Layers::default() };
     for (c, name) in ["R", "G", "B"].into_iter().enumerate() {
         layers.channels.insert(name.to_owned(), picture.planes[0].iter().map(|p| p[c]).collect());

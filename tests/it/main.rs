@@ -5,6 +5,8 @@
 mod bad_input;
 mod closed_forms;
 mod faults;
+mod methods;
 mod radiosity;
 mod same_bits;
+mod techniques;
 mod tidy;

@@ -2,9 +2,13 @@
 
 use glam::Vec3;
 use ovtigre_core::{
-    film::{estimate::Picture, schedule::Schedule},
+    bake::baked::{Form, bake},
+    film::{estimate::Picture, exr::read_layers, schedule::Schedule},
     math::colour::Rgb,
-    method::radiosity::{Reconstruction, sample},
+    method::{
+        camera::camera_ray,
+        radiosity::{Reconstruction, sample},
+    },
     radiosity::{
         element::Element,
         fineness::Fineness,
@@ -13,7 +17,11 @@ use ovtigre_core::{
         patch::{Patch, Patches},
         solution::Solution,
     },
-    render::{batch::render, prepare::Prepared, progress::Progress},
+    render::{
+        batch::render,
+        prepare::{Prepared, open},
+        progress::Progress,
+    },
     sampler::Sampler,
     scene::interaction::Side,
     settings::{CameraChoice, Method, Settings, Shadows},
@@ -22,10 +30,11 @@ use ovtigre_core::{
 use ovtigre_tests::{
     glb::Glb,
     picture::{in_environment, rendered, scene, settings},
+    program::run,
     scenes::{add, cornell, flipped, floor, furnace, lambert, quad, sphere, two_rooms},
 };
 use rayon::prelude::*;
-use serde_json::json;
+use serde_json::{Value, json};
 use std::{f64::consts::PI, sync::Arc};
 
 /// The picture of a solution: mean over some samples of each pixel.
@@ -245,7 +254,7 @@ fn light_of_a_point_over_a_floor_is_that_of_the_cosine_law_and_the_error_falls_w
 /// makes of it, and the difference of the means; both relative to the reference's mean.
 fn difference(picture: &[Rgb], reference: &Picture) -> (f64, f64) {
     let (mut squares, mut sum, mut whole) = (0.0, 0.0, 0.0);
-    let errors = reference.error.as_ref().unwrap();
+    let errors = &reference.errors[0];
     for ((p, r), e) in picture.iter().zip(&reference.planes[0]).zip(errors) {
         for c in 0..3 {
             let off = f64::from(p[c]) - f64::from(r[c]);
@@ -330,4 +339,130 @@ fn patches_are_cut_where_light_varies() {
     let levels = |list: &[&Patch]| list.iter().map(|p| f64::from(p.level)).sum::<f64>() / list.len() as f64;
     let (nearest, farthest) = (levels(&by_distance[..20]), levels(&by_distance[patches.len() - 20..]));
     assert!(nearest >= farthest + 2.0, "{nearest} {farthest}");
+}
+
+/// What a viewer shows that takes base colours, those of vertices included, as light: rays of [`shown`].
+fn unlit(glb: &[u8], settings: &Settings, white: f32, n: u32) -> Vec<Rgb> {
+    let scene = open(glb, None, settings).unwrap();
+    let one = |pixel, k| {
+        let ray = camera_ray(&scene, settings, pixel, &Sampler::new(1, 0, pixel, k));
+        let hit = scene.closest(&ray, || 0)?;
+        let at = scene.data.interaction(hit.instance, hit.triangle, hit.barycentric);
+        (ray.direction.dot(at.ng) < 0.0)
+            .then(|| at.material.base(&scene.data.textures, &at.at).truncate() * white)
+    };
+    let pixels = (0..settings.size.height).flat_map(|y| (0..settings.size.width).map(move |x| [x, y]));
+    pixels.map(|pixel| (0..n).filter_map(|k| one(pixel, k)).sum::<Rgb>() / n as f32).collect()
+}
+
+#[test]
+fn a_baked_scene_shows_the_solution() {
+    let settings = settings(24, 24, 1);
+    let prepared = scene(&cornell(), &settings);
+    let fineness = Fineness { even: 512, most: 1024, refinements: 1, rays: 64 };
+    let solution = Solution::new(&prepared.scene, Shadows::On, None, fineness).unwrap();
+    let truth = shown(&prepared, &solution, &settings, Reconstruction::Interpolate, 4);
+    // Brighter than anything but for the lamp in the first, a step of 8 bits then being larger, not in the second.
+    for (form, white, tolerance) in [(Form::VertexColours, 20.0, 2e-3), (Form::LightMap(1024), 2.5, 1.5e-2)] {
+        let baked = bake(&prepared.scene.data, &solution, form, Some(white)).unwrap();
+        let picture = unlit(&baked.glb, &settings, baked.white, 4);
+        let (mut squares, mut count) = (0.0, 0);
+        for (i, (found, truth)) in
+            picture.iter().zip(&truth).enumerate().filter(|(_, (_, t))| t.max_element() < 2.0)
+        {
+            let off = (*found - *truth).abs().max_element();
+            // Three steps of sRGB's eight bits at its steepest, and what texels do not resolve; edges are as they were.
+            assert!(off < 0.06, "{form:?}: pixel {i} shows {found}, not {truth}");
+            squares += f64::from(off * off);
+            count += 1;
+        }
+        assert!(count > 500);
+        let rms = (squares / f64::from(count)).sqrt();
+        assert!(rms < tolerance, "{form:?}: {rms}");
+        let text = serde_json::from_slice::<Value>(json_chunk(&baked.glb)).unwrap();
+        assert_eq!(text["extensionsUsed"], json!(["KHR_materials_unlit"]));
+        assert!(text.get("extensionsRequired").is_none());
+        assert_eq!(text["asset"]["extras"]["ovtigre"]["white"], json!(baked.white));
+        let names: Vec<&str> =
+            text["nodes"].as_array().unwrap().iter().filter_map(|n| n["name"].as_str()).collect();
+        for name in ["left", "low block", "lamp"] {
+            assert!(names.contains(&name), "{names:?}");
+        }
+        assert_eq!(text["cameras"].as_array().unwrap().len(), 1);
+        let map = baked.light_map.map(|map| read_layers(&map.exr()).unwrap());
+        assert_eq!(map.is_some(), form != Form::VertexColours);
+        assert!(
+            map.is_none_or(|m| m.channels["R"].iter().fold(0.0_f32, |a, b| a.max(*b)) > 11.9),
+            "the lamp"
+        );
+    }
+}
+
+/// The document in a binary glTF.
+fn json_chunk(glb: &[u8]) -> &[u8] {
+    let length = u32::from_le_bytes(glb[12..16].try_into().unwrap()) as usize;
+    &glb[20..20 + length]
+}
+
+#[test]
+fn a_textured_floor_keeps_its_texture_when_baked() {
+    let glb = ovtigre_tests::room::room();
+    let settings = settings(24, 24, 1);
+    let prepared = scene(&glb, &settings);
+    let solution = Solution::new(&prepared.scene, Shadows::On, None, Fineness::even(1, 16)).unwrap();
+    let truth = shown(&prepared, &solution, &settings, Reconstruction::Interpolate, 1);
+    let baked = bake(&prepared.scene.data, &solution, Form::VertexColours, Some(50.0)).unwrap();
+    let found = unlit(&baked.glb, &settings, baked.white, 1);
+    let floor: Vec<usize> = (0..24 * 24).filter(|i| i / 24 >= 20 && truth[*i].max_element() > 0.0).collect();
+    assert!(floor.len() > 50, "{}", floor.len());
+    for i in floor {
+        // Its reflectance towards the eye is not quite the mean one: it is of plastic.
+        let off = (found[i] / truth[i] - 1.0).abs().max_element();
+        assert!(off < 0.1, "pixel {i} shows {}, not {}", found[i], truth[i]);
+    }
+}
+
+#[test]
+fn the_command_bakes_and_refuses_in_one_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    std::fs::write(at("box.glb"), cornell()).unwrap();
+    let (scene, out) = (at("box.glb"), at("out.glb"));
+    let report = at("report.json");
+    let done = run(["bake", &scene, "-o", &out, "--patches", "300", "--report", &report]);
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    let report: Value = serde_json::from_slice(&std::fs::read(report).unwrap()).unwrap();
+    assert_eq!(report["certified"], json!(false));
+    assert_eq!(report["residuals"].as_array().unwrap().len(), report["iterations"]);
+    assert!(open(std::fs::read(&out).unwrap(), None, &settings(4, 4, 1)).is_ok());
+    std::fs::write(at("bad.glb"), b"hello").unwrap();
+    let cases: [(&[&str], &str); 5] = [
+        (&[&scene, "-o", &at("out.gltf")], "ends in .glb"),
+        (&[&scene, "-o", &at("no/where/out.glb")], "no such folder"),
+        (&[&at("bad.glb"), "-o", &out], "bad.glb"),
+        (&[&scene, "-o", &out, "--patches", "9", "--as", "light-map", "--size", "100"], "power of two"),
+        (&[&scene, "-o", &out, "--patches", "9", "--as", "light-map", "--size", "16"], "do not fit"),
+    ];
+    for (arguments, says) in cases {
+        let output = run(["bake"].iter().chain(arguments));
+        let text = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{text}");
+        let errors: Vec<&str> = text.lines().filter(|line| line.starts_with("error: ")).collect();
+        assert!(errors.len() == 1 && errors[0].contains(says), "{arguments:?}: {text}");
+    }
+}
+
+#[test]
+fn a_farm_renders_by_radiosity() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    std::fs::write(at("furnace.glb"), furnace(0.5, 1.0)).unwrap();
+    let out = at("out.exr");
+    let flags = ["--method", "radiosity", "--size", "8x8", "--samples", "16", "--workers", "1", "-o", &out];
+    let done = run(["render", &at("furnace.glb")].iter().copied().chain(flags));
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    let picture = read_layers(&std::fs::read(out).unwrap()).unwrap();
+    for value in &picture.channels["G"] {
+        assert!((value - 2.0).abs() < 1e-5, "{value}");
+    }
 }

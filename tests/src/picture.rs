@@ -6,7 +6,7 @@ use ovtigre_core::{
         error::{ErrorEstimate, estimate},
         estimate::{Picture, picture},
         schedule::Schedule,
-        size::Size,
+        size::{Region, Size},
     },
     render::{
         batch::render,
@@ -18,6 +18,24 @@ use ovtigre_core::{
         Weights,
     },
 };
+
+fn mean_and_error(means: &[f64]) -> (f64, f64) {
+    let r = means.len() as f64;
+    let mean = means.iter().sum::<f64>() / r;
+    let variance = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (r * (r - 1.0));
+    (mean, variance.sqrt())
+}
+
+/// Mean over its samples, summed over the pixels of a rectangle and all channels.
+fn sum_within(prefix: &Prefix, plane: usize, within: Region) -> f64 {
+    let region = prefix.region();
+    let inside = |i: usize| {
+        let (x, y) = (region.x + i as u32 % region.width, region.y + i as u32 / region.width);
+        (within.x..within.x + within.width).contains(&x) && (within.y..within.y + within.height).contains(&y)
+    };
+    let pixels = prefix.layer(plane).chunks(3).enumerate().filter(|(i, _)| inside(*i));
+    pixels.map(|(_, rgb)| rgb.iter().sum::<f64>()).sum::<f64>() / f64::from(prefix.samples())
+}
 
 /// Settings with nothing special.
 pub fn settings(width: u32, height: u32, replicates: u32) -> Settings {
@@ -62,12 +80,13 @@ pub struct Rendered {
 /// Renders `samples` samples a pixel and replicate, in one process.
 pub fn rendered(glb: &[u8], settings: &Settings, samples: u32) -> Rendered {
     let scene = scene(glb, settings);
-    let schedule = Schedule::new(settings.size.frame(), 1, settings.replicates, samples);
+    let planes = settings.layers.len() + 1;
+    let schedule = Schedule::new(settings.size.frame(), planes as u32, settings.replicates, samples);
     let prefixes = (0..schedule.regions().len())
         .map(|region| {
             (0..settings.replicates)
                 .map(|replicate| {
-                    let mut prefix = Prefix::empty(schedule.regions()[region], replicate, 1);
+                    let mut prefix = Prefix::empty(schedule.regions()[region], replicate, planes);
                     for block in 0..schedule.blocks().len() {
                         let batch = schedule.batch(region, replicate, block).expect("in the schedule");
                         let sum = render(&scene, settings, batch, &Progress::new()).expect("not stopped");
@@ -99,17 +118,43 @@ impl Rendered {
 
     /// Mean over all pixels and channels, and its standard error from the spread between replicates.
     pub fn mean(&self) -> (f64, f64) {
-        let r = f64::from(self.settings.replicates);
-        let means: Vec<f64> = (0..self.settings.replicates as usize)
+        self.mean_of(0)
+    }
+
+    /// The same of a plane: 0 for the picture, then the layers.
+    pub fn mean_of(&self, plane: usize) -> (f64, f64) {
+        mean_and_error(&self.means(plane, self.settings.size.frame()))
+    }
+
+    /// Mean of each replicate over the pixels of a rectangle and all channels.
+    pub fn means(&self, plane: usize, within: Region) -> Vec<f64> {
+        (0..self.settings.replicates as usize)
             .map(|replicate| {
-                let of_region = |p: &Prefix| p.layer(0).iter().sum::<f64>() / f64::from(p.samples());
-                let sum: f64 = self.prefixes.iter().map(|region| of_region(&region[replicate])).sum();
-                sum / (3.0 * self.settings.size.pixels() as f64)
+                let sum: f64 = self.prefixes.iter().map(|r| sum_within(&r[replicate], plane, within)).sum();
+                sum / (3.0 * within.pixels() as f64)
             })
-            .collect();
-        let mean = means.iter().sum::<f64>() / r;
-        let variance = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (r * (r - 1.0));
-        (mean, variance.sqrt())
+            .collect()
+    }
+
+    /// Asserts that `other` has the same mean over the whole picture and over blocks of a quarter of its sides: within 4.5
+    /// and 6 standard errors of the difference (15 degrees of freedom and more: once in 2,400 and in 40,000), the whole
+    /// known to `power` of its mean.
+    pub fn assert_same(&self, other: &Self, power: f64, what: &str) {
+        let frame = self.settings.size.frame();
+        let compare = |within: Region, sigmas: f64| {
+            let (a, b) = (mean_and_error(&self.means(0, within)), mean_and_error(&other.means(0, within)));
+            let error = a.1.hypot(b.1);
+            let tolerance = sigmas * error + 1e-5 * a.0.abs();
+            assert!((a.0 - b.0).abs() <= tolerance, "{what}, {within}: {a:?} against {b:?}");
+            (error, a.0)
+        };
+        let (error, mean) = compare(frame, 4.5);
+        assert!(error <= power * mean, "{what}: the error {error} of {mean} is too large to find a bias");
+        let (width, height) = (frame.width / 4, frame.height / 4);
+        for block in 0..16 {
+            compare(Region { x: block % 4 * width, y: block / 4 * height, width, height }, 6.0);
+        }
+        assert_eq!((self.invalid(), other.invalid()), (0, 0), "{what}: samples were dropped");
     }
 
     /// Asserts that the mean of the picture is `truth`: within 4.5 standard errors (15 degrees of freedom: once in

@@ -72,7 +72,7 @@ impl Chart {
 /// texels for each as fit, in proportion to its size. `None` where not even the smallest charts fit.
 pub fn pack(sizes: &[f64], side: u32) -> Option<Vec<Chart>> {
     let longest = sizes.iter().fold(0.0_f64, |a, b| a.max(*b));
-    if !(side.is_power_of_two() && side >= SMALLEST) || !longest.is_finite() {
+    if !(side.is_power_of_two() && side >= SMALLEST && longest.is_finite()) {
         return None;
     }
     let square = |size: f64, most: u32| {
@@ -81,7 +81,9 @@ pub fn pack(sizes: &[f64], side: u32) -> Option<Vec<Chart>> {
     };
     let fits = |most: &u32| {
         let mut counts = [0_u64; 32];
-        sizes.iter().for_each(|size| counts[square(*size, *most).ilog2() as usize] += 1);
+        for size in sizes {
+            counts[square(*size, *most).ilog2() as usize] += 1;
+        }
         let needed = counts.iter().enumerate().map(|(log, n)| n.div_ceil(2) << (2 * log)).sum::<u64>();
         needed <= u64::from(side) * u64::from(side)
     };

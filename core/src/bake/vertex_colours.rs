@@ -29,10 +29,13 @@ struct Corner {
     colour: Vec4,
 }
 
+/// What vertices are told apart by: bits of position and coordinates, colour.
+type Known = ([u32; 3], [u32; 2], [u16; 4]);
+
 /// Triangles of one material, with each vertex once.
 #[derive(Default)]
 struct Primitive {
-    known: BTreeMap<([u32; 3], [u32; 2], [u16; 4]), u32>,
+    known: BTreeMap<Known, u32>,
     positions: Vec<Vec3>,
     uvs: Vec<Vec2>,
     colours: Vec<[u16; 4]>,

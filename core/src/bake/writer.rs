@@ -35,7 +35,7 @@ impl Writer {
 
     /// An accessor of positions, with their bounds as glTF demands.
     pub fn positions(&mut self, points: &[Vec3]) -> usize {
-        let bytes: Vec<u8> = points.iter().flat_map(|p| p.to_array()).flat_map(f32::to_le_bytes).collect();
+        let bytes: Vec<u8> = points.iter().flat_map(Vec3::to_array).flat_map(f32::to_le_bytes).collect();
         let low = points.iter().fold(Vec3::INFINITY, |low, p| low.min(*p));
         let high = points.iter().fold(Vec3::NEG_INFINITY, |high, p| high.max(*p));
         let view = self.view(&bytes, Some(VERTICES));
@@ -48,7 +48,7 @@ impl Writer {
 
     /// An accessor of texture coordinates.
     pub fn coordinates(&mut self, points: &[Vec2]) -> usize {
-        let bytes: Vec<u8> = points.iter().flat_map(|p| p.to_array()).flat_map(f32::to_le_bytes).collect();
+        let bytes: Vec<u8> = points.iter().flat_map(Vec2::to_array).flat_map(f32::to_le_bytes).collect();
         let view = self.view(&bytes, Some(VERTICES));
         self.push(
             "accessors",

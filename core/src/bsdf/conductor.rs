@@ -19,11 +19,28 @@ impl Conductor {
         Self { gloss: Gloss::new(alpha, Schlick { f0, f90: 1.0 }) }
     }
 
+    /// Another interface with nothing below it.
+    pub(super) fn of(gloss: Gloss) -> Self {
+        Self { gloss }
+    }
+
+    pub(super) fn letter(&self) -> Letter {
+        self.gloss.letter()
+    }
+
     pub(super) fn letters(&self) -> Letters {
-        match self.gloss {
-            Gloss::Smooth(_) => Letters::of(Letter::Specular),
-            Gloss::Rough(_) => Letters::of(Letter::Glossy),
-        }
+        Letters::of(self.letter())
+    }
+
+    /// What an ideally smooth one reflects.
+    pub(super) fn mirror(&self, wo: Vec3) -> Rgb {
+        self.gloss.schlick().at(wo.z.abs())
+    }
+
+    /// Reflects like an ideally smooth one, under a letter.
+    pub(super) fn draw_mirror(&self, wo: Vec3, letter: Letter) -> Drawn {
+        let delta = Delta { value: self.mirror(wo), probability: 1.0, letter };
+        Drawn { wi: reflect(wo, Vec3::Z), eta: 1.0, delta: Some(delta) }
     }
 
     pub(super) fn albedo(&self, wo: Vec3) -> Rgb {
@@ -46,10 +63,7 @@ impl Conductor {
     pub(super) fn draw(&self, wo: Vec3, u_lobe: f32, u: Vec2) -> Option<Drawn> {
         let above = upward(wo);
         let wi = match &self.gloss {
-            Gloss::Smooth(schlick) => {
-                let delta = Delta { value: schlick.at(above.z), probability: 1.0 };
-                return Some(Drawn { wi: reflect(wo, Vec3::Z), eta: 1.0, delta: Some(delta) });
-            }
+            Gloss::Smooth(_) => return Some(self.draw_mirror(wo, Letter::Specular)),
             Gloss::Rough(rough) => match split(u_lobe, share_of_first_bounce(&rough.see(above))) {
                 Ok(_) => rough.draw_single(above, u),
                 Err(_) => rough.between.draw(u),

@@ -4,7 +4,7 @@ use crate::math::colour::Rgb;
 use glam::Vec3;
 
 /// A scattering letter of a path expression.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Letter {
     /// `D`: broad, reflected or transmitted.
     Diffuse,
@@ -12,6 +12,28 @@ pub enum Letter {
     Glossy,
     /// `S_M`: ideally specular; its density is a Dirac delta.
     Specular,
+    /// `S_T`: gloss taken as a mirror's. Its density is a Dirac delta, and surfaces have it only where a render
+    /// asks for it.
+    Mirrored,
+}
+
+impl Letter {
+    /// Number of letters.
+    pub const COUNT: usize = 4;
+    /// Every letter, in the order of their numbers.
+    pub const ALL: [Self; Self::COUNT] = [Self::Diffuse, Self::Glossy, Self::Specular, Self::Mirrored];
+
+    /// Its number.
+    #[inline]
+    pub const fn index(self) -> usize {
+        self as usize
+    }
+
+    /// Whether its density is a Dirac delta, so that nothing can be connected to it.
+    #[inline]
+    pub const fn is_delta(self) -> bool {
+        matches!(self, Self::Specular | Self::Mirrored)
+    }
 }
 
 /// A set of letters.
@@ -21,8 +43,10 @@ pub struct Letters(u8);
 impl Letters {
     /// No letter.
     pub const NONE: Self = Self(0);
+    /// Every letter that surfaces have by themselves: `D`, `S` and `S_M`.
+    pub const NATURAL: Self = Self(0b0111);
     /// Every letter.
-    pub const ALL: Self = Self(0b111);
+    pub const ALL: Self = Self(0b1111);
 
     /// The set of one letter.
     pub const fn of(letter: Letter) -> Self {
@@ -35,9 +59,30 @@ impl Letters {
         Self(self.0 | other.0)
     }
 
+    /// Letters in both sets.
+    #[must_use]
+    pub const fn intersection(self, other: Self) -> Self {
+        Self(self.0 & other.0)
+    }
+
     /// Whether `letter` is in the set.
     pub const fn has(self, letter: Letter) -> bool {
         self.0 & (1 << letter as u8) != 0
+    }
+
+    /// Whether every letter of `other` is in the set.
+    pub const fn contains(self, other: Self) -> bool {
+        self.0 & other.0 == other.0
+    }
+
+    /// Whether there is no letter in the set.
+    pub const fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    /// The letters, in the order of their numbers.
+    pub fn iter(self) -> impl Iterator<Item = Letter> {
+        Letter::ALL.into_iter().filter(move |letter| self.has(*letter))
     }
 }
 
@@ -67,6 +112,15 @@ impl Scattered {
     }
 }
 
+impl core::ops::Mul<f32> for Scattered {
+    type Output = Self;
+
+    #[inline]
+    fn mul(self, factor: f32) -> Self {
+        Self { diffuse: self.diffuse * factor, glossy: self.glossy * factor }
+    }
+}
+
 /// A sampled direction.
 #[derive(Clone, Copy, Debug)]
 pub struct BsdfSample {
@@ -89,8 +143,10 @@ pub enum SampleKind {
         /// Density over solid angle.
         pdf: f32,
     },
-    /// Letter `S_M`: `weight` is f · |cos θᵢ| over the discrete probability of this choice.
+    /// A Dirac delta: `weight` is f · |cos θᵢ| over the discrete probability of this choice.
     Specular {
+        /// `S_M`, or `S_T` of the ideal twin of a glossy lobe.
+        letter: Letter,
         /// Throughput factor.
         weight: Rgb,
         /// Discrete probability of the choice.

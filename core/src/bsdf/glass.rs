@@ -76,11 +76,22 @@ impl Glass {
         Self { interface, kind }
     }
 
-    pub(super) fn letters(&self) -> Letters {
+    pub(super) fn letter(&self) -> Letter {
         match self.kind {
-            Kind::Absent | Kind::Smooth(_) => Letters::of(Letter::Specular),
-            Kind::Sheet(_) | Kind::Solid(_) => Letters::of(Letter::Glossy),
+            Kind::Absent | Kind::Smooth(_) => Letter::Specular,
+            Kind::Sheet(_) | Kind::Solid(_) => Letter::Glossy,
         }
+    }
+
+    pub(super) fn letters(&self) -> Letters {
+        Letters::of(self.letter())
+    }
+
+    /// Like the smooth surface, under the letter of a twin.
+    pub(super) fn draw_twin(&self, wo: Vec3, u_lobe: f32, transport: Transport) -> Option<Drawn> {
+        let mut drawn = self.draw_smooth(self.interface.walls, wo, u_lobe, transport)?;
+        drawn.delta.iter_mut().for_each(|delta| delta.letter = Letter::Mirrored);
+        Some(drawn)
     }
 
     /// That of the smooth surface: an estimate for choosing among lobes.
@@ -111,7 +122,7 @@ impl Glass {
         let facet = self.interface.facet(wo.z.abs(), eta);
         let mirrored = facet.chance_of_reflection()?;
         if u_lobe < mirrored {
-            let delta = Delta { value: facet.reflected, probability: mirrored };
+            let delta = Delta { value: facet.reflected, probability: mirrored, letter: Letter::Specular };
             return Some(Drawn { wi: reflect(wo, Vec3::Z), eta: 1.0, delta: Some(delta) });
         }
         let probability = 1.0 - mirrored;
@@ -119,13 +130,14 @@ impl Glass {
             return Some(straight(wo, probability, facet.transmitted));
         }
         let wi = refract(wo, Vec3::Z * wo.z.signum(), eta)?;
-        let delta = Delta { value: facet.transmitted * radiance_factor(transport, eta), probability };
+        let value = facet.transmitted * radiance_factor(transport, eta);
+        let delta = Delta { value, probability, letter: Letter::Specular };
         Some(Drawn { wi, eta, delta: Some(delta) })
     }
 }
 
 fn straight(wo: Vec3, probability: f32, value: Rgb) -> Drawn {
-    Drawn { wi: -wo, eta: 1.0, delta: Some(Delta { value, probability }) }
+    Drawn { wi: -wo, eta: 1.0, delta: Some(Delta { value, probability, letter: Letter::Specular }) }
 }
 
 impl Interface {

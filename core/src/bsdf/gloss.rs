@@ -7,6 +7,7 @@
 //! microfacets reflect, and whoever asks for `D` means the base below them.
 
 use crate::bsdf::albedo::{Means, Row};
+use crate::bsdf::event::Letter;
 use crate::bsdf::fresnel::{Schlick, fifth_power};
 use crate::bsdf::ggx::{Ggx, Reach, reflect};
 use crate::math::colour::{Rgb, luminance};
@@ -64,6 +65,21 @@ impl Gloss {
                 let between = Between::new(ggx);
                 Self::Rough(RoughGloss { ggx, schlick, multiple: between.reflected(schlick.mean()), between })
             }
+        }
+    }
+
+    pub(super) fn letter(&self) -> Letter {
+        match self {
+            Self::Smooth(_) => Letter::Specular,
+            Self::Rough(_) => Letter::Glossy,
+        }
+    }
+
+    /// Reflectance of a facet.
+    pub(super) fn schlick(&self) -> Schlick {
+        match self {
+            Self::Smooth(schlick) => *schlick,
+            Self::Rough(rough) => rough.schlick,
         }
     }
 

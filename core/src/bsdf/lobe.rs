@@ -1,6 +1,6 @@
 //! What the lobes of a surface hand to each other.
 
-use crate::bsdf::event::Scattered;
+use crate::bsdf::event::{Letter, Scattered};
 use crate::math::colour::Rgb;
 use glam::Vec3;
 
@@ -29,6 +29,7 @@ pub(super) struct Delta {
     /// f · |cos θᵢ|, the coefficient of the Dirac delta.
     pub(super) value: Rgb,
     pub(super) probability: f32,
+    pub(super) letter: Letter,
 }
 
 impl Drawn {

@@ -18,6 +18,9 @@ pub struct Mixture {
 }
 
 impl Mixture {
+    /// Nothing: all light is absorbed.
+    pub(super) const NONE: Self = Self { conductor: None, plastic: None, glass: None };
+
     pub(super) fn letters(&self) -> Letters {
         let conductor = self.conductor.map_or(Letters::NONE, |(_, part)| part.letters());
         let plastic = self.plastic.map_or(Letters::NONE, |(_, part)| part.letters());

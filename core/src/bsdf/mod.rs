@@ -11,6 +11,7 @@ pub mod fresnel;
 pub mod ggx;
 pub mod glass;
 mod gloss;
+pub mod kept;
 pub mod lambert;
 mod lobe;
 pub mod mixture;
@@ -28,8 +29,9 @@ use crate::bsdf::conductor::Conductor;
 use crate::bsdf::event::{BsdfSample, Letter, Letters, SampleKind, Scattered, Transport};
 use crate::bsdf::fresnel::{Schlick, dielectric_at_normal};
 use crate::bsdf::glass::Glass;
+use crate::bsdf::kept::Kept;
 use crate::bsdf::lambert::Lambert;
-use crate::bsdf::lobe::{Drawn, Evaluated};
+use crate::bsdf::lobe::{Delta, Drawn, Evaluated};
 use crate::bsdf::mixture::Mixture;
 use crate::bsdf::plastic::Plastic;
 use crate::bsdf::surface::SurfaceParameters;
@@ -56,35 +58,43 @@ pub enum Bsdf {
     Glass(Glass),
     /// Several of them.
     Mixture(Mixture),
+    /// Some lobes of any of them.
+    Kept(Kept),
 }
 
 impl Bsdf {
     /// metallic · conductor + (1 − metallic) · ((1 − transmission) · plastic + transmission · glass).
     pub fn from_surface(given: &SurfaceParameters) -> Self {
+        Self::whole(&clamped(given))
+    }
+
+    /// The same with no lobes but those of `letters`. With the letter `S_T` among them every glossy lobe has, beside itself
+    /// if that is kept, an ideal twin: what it would be at roughness 0.
+    pub fn keeping(given: &SurfaceParameters, letters: Letters) -> Self {
         let s = clamped(given);
-        let alpha = s.roughness * s.roughness;
-        let [metal, plastic, glass] =
-            [s.metallic, (1.0 - s.metallic) * (1.0 - s.transmission), (1.0 - s.metallic) * s.transmission];
-        let new_conductor = || Conductor::new(alpha, s.base_color);
-        let new_plastic = || {
-            let f0 = (dielectric_at_normal(s.ior) * s.specular_color).min(Rgb::ONE) * s.specular;
-            Plastic::new(alpha, Schlick { f0, f90: s.specular }, s.base_color)
-        };
-        let new_glass = || Glass::new(&s, alpha);
+        let whole = Self::whole(&s);
+        let own = whole.letters();
+        let twins = letters.has(Letter::Mirrored) && own.has(Letter::Glossy);
+        match whole {
+            whole if letters.contains(own) && !twins => whole,
+            // Nothing but diffuse.
+            Self::Lambert(_) => Self::Kept(Kept::new(Mixture::NONE, letters)),
+            _ => Self::Kept(Kept::new(mixture(&s), letters)),
+        }
+    }
+
+    fn whole(s: &SurfaceParameters) -> Self {
+        let [metal, plastic, glass] = weights(s);
         if metal >= 1.0 {
-            Self::Conductor(new_conductor())
+            Self::Conductor(new_conductor(s))
         } else if plastic >= 1.0 && s.specular == 0.0 {
             Self::Lambert(Lambert { reflectance: s.base_color })
         } else if plastic >= 1.0 {
-            Self::Plastic(new_plastic())
+            Self::Plastic(new_plastic(s))
         } else if glass >= 1.0 {
-            Self::Glass(new_glass())
+            Self::Glass(new_glass(s))
         } else {
-            Self::Mixture(Mixture {
-                conductor: (metal > 0.0).then(|| (metal, new_conductor())),
-                plastic: (plastic > 0.0).then(|| (plastic, new_plastic())),
-                glass: (glass > 0.0).then(|| (glass, new_glass())),
-            })
+            Self::Mixture(mixture(s))
         }
     }
 
@@ -96,6 +106,7 @@ impl Bsdf {
             Self::Plastic(part) => part.letters(),
             Self::Glass(part) => part.letters(),
             Self::Mixture(part) => part.letters(),
+            Self::Kept(part) => part.letters(),
         }
     }
 
@@ -136,9 +147,11 @@ impl Bsdf {
             Self::Plastic(part) => part.draw(wo, u_lobe, u)?,
             Self::Glass(part) => part.draw(wo, u_lobe, u, transport)?,
             Self::Mixture(part) => part.draw(wo, u_lobe, u, transport)?,
+            Self::Kept(part) => part.draw(wo, u_lobe, u, transport)?,
         };
         let kind = if let Some(delta) = delta {
-            SampleKind::Specular { weight: delta.value / delta.probability, probability: delta.probability }
+            let Delta { value, probability, letter } = delta;
+            SampleKind::Specular { letter, weight: value / probability, probability }
         } else {
             let Evaluated { value, pdf } = self.evaluate(wo, wi, transport);
             if !(pdf > 0.0 && pdf.is_finite()) {
@@ -160,7 +173,36 @@ impl Bsdf {
             Self::Plastic(part) => part.evaluate(wo, wi),
             Self::Glass(part) => part.evaluate(wo, wi, transport),
             Self::Mixture(part) => part.evaluate(wo, wi, transport),
+            Self::Kept(part) => part.evaluate(wo, wi, transport),
         }
+    }
+}
+
+/// Of conductor, plastic and glass.
+fn weights(s: &SurfaceParameters) -> [f32; 3] {
+    [s.metallic, (1.0 - s.metallic) * (1.0 - s.transmission), (1.0 - s.metallic) * s.transmission]
+}
+
+fn new_conductor(s: &SurfaceParameters) -> Conductor {
+    Conductor::new(s.roughness * s.roughness, s.base_color)
+}
+
+fn new_plastic(s: &SurfaceParameters) -> Plastic {
+    let f0 = (dielectric_at_normal(s.ior) * s.specular_color).min(Rgb::ONE) * s.specular;
+    Plastic::new(s.roughness * s.roughness, Schlick { f0, f90: s.specular }, s.base_color)
+}
+
+fn new_glass(s: &SurfaceParameters) -> Glass {
+    Glass::new(s, s.roughness * s.roughness)
+}
+
+/// The parts that have a weight.
+fn mixture(s: &SurfaceParameters) -> Mixture {
+    let [metal, plastic, glass] = weights(s);
+    Mixture {
+        conductor: (metal > 0.0).then(|| (metal, new_conductor(s))),
+        plastic: (plastic > 0.0).then(|| (plastic, new_plastic(s))),
+        glass: (glass > 0.0).then(|| (glass, new_glass(s))),
     }
 }
 

@@ -5,7 +5,7 @@
 //! channel (Kelemen and Szirmay-Kalos 2001). Reciprocal, and the albedo Eₛ(v) + ρ (1 − Eₛ(v)) is at most 1 in
 //! every direction; the mix in appendix B of the glTF specification exceeds 1 by far at grazing angles.
 
-use crate::bsdf::conductor::upward;
+use crate::bsdf::conductor::{Conductor, upward};
 use crate::bsdf::event::{Letter, Letters, Scattered};
 use crate::bsdf::fresnel::Schlick;
 use crate::bsdf::ggx::reflect;
@@ -41,16 +41,41 @@ impl Plastic {
     }
 
     pub(super) fn letters(&self) -> Letters {
-        let interface = match self.gloss {
-            Gloss::Smooth(_) => Letter::Specular,
-            Gloss::Rough(_) => Letter::Glossy,
-        };
-        Letters::of(interface).union(Letters::of(Letter::Diffuse))
+        Letters::of(self.interface_letter()).union(Letters::of(Letter::Diffuse))
+    }
+
+    pub(super) fn interface_letter(&self) -> Letter {
+        self.gloss.letter()
+    }
+
+    /// The interface alone, as if nothing were below it.
+    pub(super) fn interface(&self) -> Conductor {
+        Conductor::of(self.gloss)
     }
 
     pub(super) fn albedo(&self, wo: Vec3) -> Rgb {
         let interface = self.gloss.albedo(upward(wo));
         interface + self.base * (Rgb::ONE - interface)
+    }
+
+    /// Of the base as it is seen through the interface.
+    pub(super) fn base_albedo(&self, wo: Vec3) -> Rgb {
+        self.base * (Rgb::ONE - self.gloss.albedo(upward(wo))).max(Rgb::ZERO)
+    }
+
+    /// The base as it is seen through the interface, drawn by [`Self::draw_base`].
+    pub(super) fn evaluate_base(&self, wo: Vec3, wi: Vec3) -> Evaluated {
+        if wo.z * wi.z <= 0.0 {
+            return Evaluated::default();
+        }
+        let (wo, wi) = (upward(wo), upward(wi));
+        let diffuse = self.below(self.gloss.albedo(wo), self.gloss.albedo(wi)) * wi.z;
+        Evaluated { value: Scattered { diffuse, glossy: Rgb::ZERO }, pdf: wi.z * FRAC_1_PI }
+    }
+
+    pub(super) fn draw_base(wo: Vec3, u: Vec2) -> Option<Drawn> {
+        let wi = warp::cosine_hemisphere(u);
+        (wi.z > 0.0).then(|| Drawn::smooth(wi.with_z(wi.z.copysign(wo.z))))
     }
 
     pub(super) fn evaluate(&self, wo: Vec3, wi: Vec3) -> Evaluated {
@@ -85,7 +110,8 @@ impl Plastic {
                 let mirrored = schlick.at(above.z);
                 let shares = self.shares(luminance(mirrored), 0.0, mirrored);
                 if u_lobe < shares.single {
-                    let delta = Delta { value: mirrored, probability: shares.single };
+                    let letter = Letter::Specular;
+                    let delta = Delta { value: mirrored, probability: shares.single, letter };
                     return Some(Drawn { wi: reflect(wo, Vec3::Z), eta: 1.0, delta: Some(delta) });
                 }
                 warp::cosine_hemisphere(u)

@@ -34,7 +34,8 @@ pub fn compare(a: &Layers, b: &Layers) -> Result<Comparison, String> {
     }
     let mut layers = BTreeMap::new();
     for name in b.channels.keys() {
-        let Some(prefix) = name.strip_suffix('R').filter(|p| !p.ends_with("error.")) else { continue };
+        let is_error = |prefix: &str| prefix == "error." || prefix.ends_with(".error.");
+        let Some(prefix) = name.strip_suffix('R').filter(|p| !is_error(p)) else { continue };
         if let (Some(x), Some(y)) = (triple(a, prefix), triple(b, prefix)) {
             let layer = if prefix.is_empty() { "picture" } else { prefix.trim_end_matches('.') };
             layers.insert(layer.to_owned(), difference(b.width, b.height, x, y));
@@ -90,6 +91,22 @@ mod tests {
     fn layers(value: f32) -> Layers {
         let channels = ["R", "G", "B"].map(|c| (c.to_owned(), vec![value; 12]));
         Layers { width: 4, height: 3, channels: channels.into(), ..Layers::default() }
+    }
+
+    #[test]
+    fn layers_are_compared_one_by_one_and_their_errors_are_not() {
+        let with = |value: f32| {
+            let mut all = layers(1.0);
+            for prefix in ["terror.", "b1.", "error.", "b1.error."] {
+                let own = ["R", "G", "B"].map(|c| (format!("{prefix}{c}"), vec![value; 12]));
+                all.channels.extend(own);
+            }
+            all
+        };
+        let c = compare(&with(3.0), &with(1.0)).unwrap();
+        assert_eq!(c.layers.keys().collect::<Vec<_>>(), ["b1", "picture", "terror"]);
+        assert_eq!((c.layers["picture"].relative_error, c.layers["b1"].mean_ratio), (0.0, 3.0));
+        assert_eq!(c.relative_error, c.layers["terror"].relative_error);
     }
 
     #[test]

@@ -25,7 +25,7 @@ pub struct ErrorEstimate {
 ///
 /// The interval is a jackknife over replicates: pixels may be correlated, replicates are not.
 pub fn estimate(region: Region, prefixes: &[Vec<Prefix>], look: u32) -> Option<ErrorEstimate> {
-    let replicates = replicate_means(prefixes)?;
+    let replicates = replicate_means(prefixes, 0)?;
     let count = replicates.len();
     let all: Vec<&[f64]> = replicates.iter().map(Vec::as_slice).collect();
     let (rms, relative) = mean_squares(region, &all);
@@ -42,6 +42,36 @@ pub fn estimate(region: Region, prefixes: &[Vec<Prefix>], look: u32) -> Option<E
     Some(ErrorEstimate { rms: rms.sqrt(), relative: relative.sqrt(), relative_upper })
 }
 
+/// One plane of a picture, as a whole.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlaneSummary {
+    /// Mean luminance over the pixels.
+    pub mean_luminance: f64,
+    /// As in [`ErrorEstimate`]; `None` for a single replicate or where a replicate has no samples.
+    pub rms: Option<f64>,
+    /// As in [`ErrorEstimate`], by the plane's own luminance.
+    pub relative: Option<f64>,
+}
+
+/// One plane of `prefixes[region][replicate]`, whose regions are bands that cover `region`.
+pub fn summarise(region: Region, prefixes: &[Vec<Prefix>], plane: usize) -> PlaneSummary {
+    let (mut light, mut samples) = (0.0, 0.0);
+    for prefix in prefixes.iter().flatten() {
+        let pixels = prefix.layer(plane).chunks_exact(3);
+        light += pixels.map(|p| 0.2126 * p[0] + 0.7152 * p[1] + 0.0722 * p[2]).sum::<f64>();
+        samples += f64::from(prefix.samples()) * prefix.region().pixels() as f64;
+    }
+    let errors = replicate_means(prefixes, plane).map(|means| {
+        let all: Vec<&[f64]> = means.iter().map(Vec::as_slice).collect();
+        mean_squares(region, &all)
+    });
+    PlaneSummary {
+        mean_luminance: if samples > 0.0 { light / samples } else { 0.0 },
+        rms: errors.map(|(rms, _)| rms.sqrt()),
+        relative: errors.map(|(_, relative)| relative.sqrt()),
+    }
+}
+
 /// Upper end of a one-sided interval around `centre` from jackknife pseudo-values.
 fn upper(centre: f64, pseudo_values: &[f64], look: u32) -> f64 {
     let n = pseudo_values.len() as f64;
@@ -52,16 +82,16 @@ fn upper(centre: f64, pseudo_values: &[f64], look: u32) -> f64 {
     centre.max(mean) + student_t_upper(alpha, pseudo_values.len() as u32 - 1) * variance.sqrt()
 }
 
-/// Means of each replicate over all regions, three channels a pixel; `None` where there is only
+/// Means of a plane of each replicate over all regions, three channels a pixel; `None` where there is only
 /// one replicate, or one without samples.
-fn replicate_means(prefixes: &[Vec<Prefix>]) -> Option<Vec<Vec<f64>>> {
+fn replicate_means(prefixes: &[Vec<Prefix>], plane: usize) -> Option<Vec<Vec<f64>>> {
     let count = prefixes.first().map_or(0, Vec::len);
     if count < 2 || prefixes.iter().flatten().any(|p| p.samples() == 0) {
         return None;
     }
     let mean = |prefix: &Prefix| -> Vec<f64> {
         let scale = 1.0 / f64::from(prefix.samples());
-        prefix.layer(0).iter().map(|s| s * scale).collect()
+        prefix.layer(plane).iter().map(|s| s * scale).collect()
     };
     Some((0..count).map(|r| prefixes.iter().flat_map(|region| mean(&region[r])).collect()).collect())
 }
@@ -182,6 +212,30 @@ mod tests {
             .count();
         // The first look claims 1 − 6·0.05/π² = 0.9696; binomial σ is 0.0086.
         assert!(covered as f64 / f64::from(trials) > 0.9696 - 3.0 * 0.0086, "{covered} of {trials}");
+    }
+
+    #[test]
+    fn each_plane_is_summarised_by_itself() {
+        let size = Size { width: 32, height: 32 };
+        let schedule = Schedule::new(size.frame(), 2, 4, 1);
+        let mut state = 5;
+        let one = (0..4).map(|r| {
+            let mut prefix = Prefix::empty(size.frame(), r, 2);
+            let grey: Vec<f32> = (0..size.frame().pixels()).map(|_| noise(&mut state)).collect();
+            let plane = |scale: f32| grey.iter().map(|v| [scale * v; 3]).collect();
+            let (batch, planes) = (schedule.batch(0, r, 0).unwrap(), vec![plane(1.0), plane(0.125)]);
+            prefix.append(&Sum { batch, planes, invalid: InvalidSamples::default(), rays: 0 }).unwrap();
+            prefix
+        });
+        let prefixes = vec![one.collect()];
+        let [whole, layer] = [0, 1].map(|plane| summarise(size.frame(), &prefixes, plane));
+        let all = estimate(size.frame(), &prefixes, 1).unwrap();
+        assert_eq!((whole.rms, whole.relative), (Some(all.rms), Some(all.relative)));
+        // A power of two changes no bit.
+        assert_eq!(layer.mean_luminance, 0.125 * whole.mean_luminance);
+        assert_eq!((layer.rms, layer.relative), (Some(0.125 * all.rms), Some(all.relative)));
+        // Mean 1/2, σ² 1/12 of 4096 samples.
+        assert!((whole.mean_luminance - 0.5).abs() < 3.0 / (12.0 * 4096.0_f64).sqrt(), "{whole:?}");
     }
 
     #[test]

@@ -15,8 +15,8 @@ pub struct Picture {
     pub region: Region,
     /// Means: the picture first, then each layer.
     pub planes: Vec<Plane>,
-    /// Standard error of the mean of the picture; `None` for a single replicate.
-    pub error: Option<Plane>,
+    /// Standard error of the mean of each plane; empty for a single replicate.
+    pub errors: Vec<Plane>,
     /// Samples a pixel, over all replicates; the mean where pixels have different numbers.
     pub samples: f64,
 }
@@ -27,7 +27,7 @@ pub fn picture(size: Size, region: Region, prefixes: &[Vec<Prefix>]) -> Picture 
     let layers = prefixes.first().and_then(|r| r.first()).map_or(1, Prefix::layers);
     let mut planes = vec![Vec::with_capacity(region.pixels()); layers];
     let replicates = prefixes.first().map_or(0, Vec::len);
-    let mut error = (replicates > 1).then(|| Vec::with_capacity(region.pixels()));
+    let mut errors = if replicates > 1 { planes.clone() } else { Vec::new() };
     let mut samples = 0.0;
     for replicates in prefixes {
         let counts: Vec<f64> = replicates.iter().map(|p| f64::from(p.samples())).collect();
@@ -37,14 +37,13 @@ pub fn picture(size: Size, region: Region, prefixes: &[Vec<Prefix>]) -> Picture 
         for (layer, plane) in planes.iter_mut().enumerate() {
             let sums: Vec<&[f64]> = replicates.iter().map(|p| p.layer(layer)).collect();
             plane.extend((0..pixels).map(|i| triple(|c| pooled_mean(&sums, i * 3 + c, count) as f32)));
-        }
-        if let Some(error) = &mut error {
-            let sums: Vec<&[f64]> = replicates.iter().map(|p| p.layer(0)).collect();
-            let of = |i: usize| variance_of_mean(&sums, &counts, i).sqrt() as f32;
-            error.extend((0..pixels).map(|i| triple(|c| of(i * 3 + c))));
+            if let Some(error) = errors.get_mut(layer) {
+                let of = |i: usize| variance_of_mean(&sums, &counts, i).sqrt() as f32;
+                error.extend((0..pixels).map(|i| triple(|c| of(i * 3 + c))));
+            }
         }
     }
-    Picture { size, region, planes, error, samples: samples / region.pixels() as f64 }
+    Picture { size, region, planes, errors, samples: samples / region.pixels() as f64 }
 }
 
 fn triple(of: impl Fn(usize) -> f32) -> [f32; 3] {
@@ -85,16 +84,19 @@ mod tests {
         let schedule = Schedule::new(size.frame(), 1, 3, 1);
         let values = [1.0_f32, 2.0, 6.0];
         let prefixes = (0..3).map(|r| {
-            let mut prefix = Prefix::empty(size.frame(), r, 1);
+            let mut prefix = Prefix::empty(size.frame(), r, 2);
             let batch: Batch = schedule.batch(0, r, 0).unwrap();
-            let planes = vec![vec![[values[r as usize], 0.0, 1.0]; 4]];
+            let value = values[r as usize];
+            let planes = vec![vec![[value, 0.0, 1.0]; 4], vec![[0.0, 2.0 * value, 3.0]; 4]];
             prefix.append(&Sum { batch, planes, invalid: InvalidSamples::default(), rays: 0 }).unwrap();
             prefix
         });
         let picture = picture(size, size.frame(), &[prefixes.collect()]);
         // Mean 3, deviations −2, −1, 3: variance of the mean 14 / (3 · 2).
         assert_eq!(picture.planes[0], vec![[3.0, 0.0, 1.0]; 4]);
-        assert_eq!(picture.error.unwrap()[3], [(14.0_f64 / 6.0).sqrt() as f32, 0.0, 0.0]);
+        assert_eq!(picture.planes[1], vec![[0.0, 6.0, 3.0]; 4]);
+        assert_eq!(picture.errors[0][3], [(14.0_f64 / 6.0).sqrt() as f32, 0.0, 0.0]);
+        assert_eq!(picture.errors[1][3], [0.0, 2.0 * (14.0_f64 / 6.0).sqrt() as f32, 0.0]);
         assert!((picture.samples - 3.0).abs() < 1e-12);
     }
 }

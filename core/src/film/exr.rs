@@ -69,6 +69,8 @@ pub struct PictureAttributes {
     pub method: String,
     /// The path expression.
     pub paths: String,
+    /// Of each layer its name, and what it shows: a path expression, or a technique.
+    pub layers: Vec<(String, String)>,
     /// Hash of the set of batches in the picture.
     pub manifest: String,
     /// Time workers spent, summed.
@@ -189,10 +191,32 @@ fn sum_plane(layers: &Layers, prefix: &str) -> Result<Plane, ExrError> {
     Ok(plane)
 }
 
+/// Prefix of a plane's channels in a picture, by the name of its layer; `None` is the picture itself.
+pub fn prefix_of(layer: Option<&str>, part: Part) -> String {
+    match (layer, part) {
+        (None, Part::Mean) => String::new(),
+        (None, Part::Error) => "error".to_owned(),
+        (Some(name), Part::Mean) => name.to_owned(),
+        (Some(name), Part::Error) => format!("{name}.error"),
+    }
+}
+
+/// What a plane of a picture holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// Means.
+    Mean,
+    /// Their standard errors.
+    Error,
+}
+
 /// A picture: means, ZIP, linear Rec.709, with its error and layers as named channels.
 pub fn write_picture(picture: &Picture, attributes: &PictureAttributes) -> Vec<u8> {
-    let mut planes: Vec<(String, &Plane)> = vec![(String::new(), &picture.planes[0])];
-    planes.extend(picture.error.iter().map(|plane| ("error".to_owned(), plane)));
+    assert_eq!(picture.planes.len(), 1 + attributes.layers.len(), "a layer without a name");
+    let names = || std::iter::once(None).chain(attributes.layers.iter().map(|(name, _)| Some(name.as_str())));
+    let means = names().map(|name| prefix_of(name, Part::Mean)).zip(&picture.planes);
+    let errors = names().map(|name| prefix_of(name, Part::Error)).zip(&picture.errors);
+    let planes: Vec<(String, &Plane)> = means.chain(errors).collect();
     let texts = [
         ("ovtigre.job", &attributes.job),
         ("ovtigre.scene", &attributes.scene),
@@ -203,6 +227,9 @@ pub fn write_picture(picture: &Picture, attributes: &PictureAttributes) -> Vec<u
     ];
     let mut values: Vec<(&str, AttributeValue)> =
         texts.map(|(name, value)| (name, AttributeValue::Text(text(value)))).to_vec();
+    let shown: Vec<(String, &String)> =
+        attributes.layers.iter().map(|(name, shows)| (format!("ovtigre.layer.{name}"), shows)).collect();
+    values.extend(shown.iter().map(|(name, shows)| (name.as_str(), AttributeValue::Text(text(shows)))));
     values.push(("ovtigre.samples", AttributeValue::F32(attributes.samples as f32)));
     values.push(("samplesPerPixel", AttributeValue::I32(attributes.samples.round() as i32)));
     values.push(("renderTimeSeconds", AttributeValue::F32(attributes.render_seconds as f32)));
@@ -335,7 +362,9 @@ mod tests {
         let region = Region { x: 2, y: 1, width: 3, height: 2 };
         let plane = |v: f32| -> Plane { (0..6).map(|i| [v + i as f32, 0.5, 1e-30]).collect() };
         let (size, samples) = (Size { width: 8, height: 4 }, 12.0);
-        let picture = Picture { size, region, planes: vec![plane(1.0)], error: Some(plane(0.1)), samples };
+        let planes = vec![plane(1.0), plane(2.0)];
+        let picture = Picture { size, region, planes, errors: vec![plane(0.1), plane(0.2)], samples };
+        let long = "a".repeat(64);
         let says = PictureAttributes {
             job: "j".to_owned(),
             scene: "s".to_owned(),
@@ -343,6 +372,7 @@ mod tests {
             seed: 1,
             method: "path".to_owned(),
             paths: "L(D|S)*E".to_owned(),
+            layers: vec![(long.clone(), "LDE".to_owned())],
             manifest: "m".to_owned(),
             render_seconds: 1.5,
             software: "ovtigre".to_owned(),
@@ -350,8 +380,12 @@ mod tests {
         };
         let layers = read_layers(&write_picture(&picture, &says)).unwrap();
         let names: Vec<&str> = layers.channels.keys().map(String::as_str).collect();
-        assert_eq!(names, ["B", "G", "R", "error.B", "error.G", "error.R"]);
+        let of_layer = ["B", "G", "R", "error.B", "error.G", "error.R"].map(|c| format!("{long}.{c}"));
+        let own = ["B", "G", "R"].into_iter().chain(of_layer.iter().map(String::as_str));
+        assert_eq!(names, own.chain(["error.B", "error.G", "error.R"]).collect::<Vec<_>>());
         assert_eq!(layers.channels["R"], [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+        assert_eq!(layers.channels[&format!("{long}.error.R")][0], 0.2);
+        assert_eq!(layers.attributes[&format!("ovtigre.layer.{long}")], "LDE");
         assert_eq!(layers.attributes["ovtigre.paths"], "L(D|S)*E");
     }
 

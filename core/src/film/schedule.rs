@@ -13,7 +13,7 @@ const LARGEST_BLOCK_SAMPLES: u64 = 1 << 22;
 const BLOCK_MAX: u32 = 1 << 14;
 /// A partial EXR stays below this, about.
 const PARTIAL_BYTES_MAX: usize = 32 << 20;
-/// Bytes of one pixel of one layer of a partial EXR.
+/// Bytes of one pixel of one plane of a partial EXR.
 const PIXEL_BYTES: usize = 12;
 
 /// Regions × replicates × blocks.
@@ -30,16 +30,22 @@ pub struct Schedule {
 }
 
 impl Schedule {
-    /// For a picture of `region` with `layers` layers (at least 1), and `samples` sample indices a
-    /// pixel in each of `replicates` sequences.
-    pub fn new(region: Region, layers: u32, replicates: u32, samples: u32) -> Self {
-        assert!(region.pixels() > 0 && layers > 0 && replicates > 0, "an empty schedule");
+    /// For a picture of `region` with `planes` planes (at least 1: itself and its layers), and `samples` sample
+    /// indices a pixel in each of `replicates` sequences.
+    pub fn new(region: Region, planes: u32, replicates: u32, samples: u32) -> Self {
+        assert!(planes > 0, "a picture without planes");
+        let bands = region.bands(PARTIAL_BYTES_MAX / (PIXEL_BYTES * planes as usize));
+        Self { regions: bands, ..Self::whole(region, replicates, samples) }
+    }
+
+    /// The same for a method whose samples add light to any pixel: `region` is not cut, however large.
+    pub fn whole(region: Region, replicates: u32, samples: u32) -> Self {
+        assert!(region.pixels() > 0 && replicates > 0, "an empty schedule");
         let pixels = region.pixels() as u64;
         let first = power_of_two_near(FIRST_BLOCK_SAMPLES / pixels).min(256);
         let largest = power_of_two_near(LARGEST_BLOCK_SAMPLES / pixels).clamp(first, BLOCK_MAX);
         let (blocks, whole) = cut(first, largest, samples);
-        let regions = region.bands(PARTIAL_BYTES_MAX / (PIXEL_BYTES * layers as usize));
-        Self { regions, replicates, blocks, whole }
+        Self { regions: vec![region], replicates, blocks, whole }
     }
 
     /// Rectangles that cover the picture once, top to bottom.
@@ -172,5 +178,8 @@ mod tests {
         let schedule = Schedule::new(region, 3, 4, 4);
         assert!(schedule.regions().iter().all(|r| r.pixels() * 36 <= PARTIAL_BYTES_MAX));
         assert_eq!(schedule.regions().iter().map(|r| r.pixels()).sum::<usize>(), region.pixels());
+        let whole = Schedule::whole(region, 4, 4);
+        assert_eq!(whole.regions(), [region]);
+        assert_eq!((whole.blocks(), whole.replicates()), (schedule.blocks(), 4));
     }
 }

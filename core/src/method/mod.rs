@@ -1,4 +1,8 @@
-//! The ways to estimate light, each short, because `path` does the work.
+//! One file a method: short, because `path` does the work.
 
+pub mod bidirectional;
+pub mod camera;
+pub mod light;
 pub mod path;
+pub mod photon;
 pub mod radiosity;

@@ -1,18 +1,15 @@
-//! Paths from the eye, with next event: `L(D|S)*E`.
+//! Paths from the eye, with next event.
 
-use crate::math::colour::Rgb;
-use crate::path::walk::{WalkRules, radiance};
-use crate::sampler::{Dimension, Sampler};
+use crate::path::eye::{FromEye, from_eye};
+use crate::path::rules::Rules;
+use crate::path::tally::Tally;
+use crate::path::throughput::Carriage;
+use crate::sampler::Sampler;
 use crate::scene::Scene;
-use crate::settings::Settings;
-use glam::Vec2;
+use crate::trace::ray::Ray;
+use core::marker::PhantomData;
 
-/// One sample of a pixel: a place in the pixel, a place on the lens, a walk. The reconstruction filter is the pixel's
-/// own square, sampled, so that a sample touches one pixel and nothing needs a border.
-pub fn sample(scene: &Scene, settings: &Settings, pixel: [u32; 2], sampler: &Sampler, rays: &mut u64) -> Rgb {
-    let rules = WalkRules { bounces: settings.bounces.unwrap_or(u32::MAX), shadows: settings.shadows };
-    let corner = Vec2::new(pixel[0] as f32, pixel[1] as f32);
-    let place = corner + sampler.pair(Dimension::Film);
-    let lens = settings.lens.map_or(Vec2::splat(0.5), |_| sampler.pair(Dimension::Lens));
-    radiance(scene, rules, scene.view.ray(place, lens), sampler, rays)
+/// One sample of a pixel.
+pub fn sample<C: Carriage>(scene: &Scene, rules: &Rules, ray: Ray, sampler: &Sampler, tally: &mut Tally) {
+    from_eye::<C>(scene, rules, sampler, ray).run(&mut FromEye::<C>(PhantomData), tally);
 }

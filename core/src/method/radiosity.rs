@@ -3,6 +3,7 @@
 use crate::bsdf::Bsdf;
 use crate::bsdf::event::Transport;
 use crate::math::colour::Rgb;
+use crate::method::camera::camera_ray;
 use crate::radiosity::element::Element;
 use crate::radiosity::hemisphere::Numbers;
 use crate::radiosity::reflectance;
@@ -11,7 +12,7 @@ use crate::sampler::{Dimension, Sampler, Use};
 use crate::scene::Scene;
 use crate::scene::interaction::{Interaction, Side};
 use crate::settings::Settings;
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 
 /// How the solution becomes a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,9 +44,7 @@ pub fn sample(
     sampler: &Sampler,
     rays: &mut u64,
 ) -> Rgb {
-    let place = Vec2::new(pixel[0] as f32, pixel[1] as f32) + sampler.pair(Dimension::Film);
-    let lens = settings.lens.map_or(Vec2::splat(0.5), |_| sampler.pair(Dimension::Lens));
-    let ray = scene.view.ray(place, lens);
+    let ray = camera_ray(scene, settings, pixel, sampler);
     *rays += 1;
     let Some(hit) = scene.closest(&ray, || sampler.key(Dimension::Eye(0, Use::Alpha))) else {
         return scene.environment.as_ref().map_or(Rgb::ZERO, |e| e.radiance(ray.direction));

@@ -1,6 +1,14 @@
-//! What all methods share: vertices, media, next events, walks.
+//! What all methods share: expressions, vertices, walks from both ends, joints and their weights.
 
+pub mod connect;
+pub mod expression;
+pub mod eye;
+pub mod light;
 pub mod media;
-pub mod next_event;
+pub mod mis;
+pub mod photons;
+pub mod rules;
+pub mod tally;
+pub mod throughput;
 pub mod vertex;
 pub mod walk;

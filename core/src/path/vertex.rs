@@ -1,9 +1,8 @@
 //! A point of a path on a surface, and what it does to light.
 
 use crate::bsdf::Bsdf;
-use crate::bsdf::event::{SampleKind, Transport};
+use crate::bsdf::event::{Letter, Letters, SampleKind, Scattered, Transport};
 use crate::math::colour::Rgb;
-use crate::math::robust::offset_origin;
 use crate::scene::interaction::Interaction;
 use crate::trace::ray::Ray;
 use glam::{Vec2, Vec3};
@@ -16,8 +15,8 @@ pub struct Vertex<'s> {
     bsdf: Bsdf,
     /// Back along the path, in the shading frame.
     wo: Vec3,
-    /// 1 where `wo` is on the front, else −1.
-    side: f32,
+    /// Cosine between the way back and the geometric normal: positive on the front.
+    cos_back: f32,
 }
 
 /// How a sampled direction was chosen.
@@ -29,19 +28,50 @@ pub enum Density {
     Delta,
 }
 
+impl Density {
+    /// Its number; one for a Dirac delta, whose coefficient is the same from both sides.
+    #[inline]
+    pub fn over_solid_angle(self) -> f64 {
+        match self {
+            Self::SolidAngle(pdf) => f64::from(pdf),
+            Self::Delta => 1.0,
+        }
+    }
+}
+
 /// A sampled continuation of a path.
 #[derive(Clone, Copy, Debug)]
 pub struct Continuation {
     /// Where to.
     pub direction: Vec3,
-    /// f · |cos θ| / density.
-    pub weight: Rgb,
+    /// What it counts, by letter.
+    pub weight: Weight,
     /// How it was chosen.
     pub density: Density,
     /// Refractive index of the side it leaves to over that of the side it came from.
     pub eta: f32,
     /// Whether it stays on the side of the surface it came from.
     pub crossing: Crossing,
+}
+
+/// f · |cos θ| over the density, by letter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Weight {
+    /// Of smooth lobes, all of which can make any direction.
+    Smooth(Scattered),
+    /// Of an ideally specular lobe.
+    Specular(Letter, Rgb),
+}
+
+impl Weight {
+    /// Over all letters.
+    #[inline]
+    pub fn total(self) -> Rgb {
+        match self {
+            Self::Smooth(scattered) => scattered.total(),
+            Self::Specular(_, weight) => weight,
+        }
+    }
 }
 
 /// On which side a path goes on.
@@ -55,12 +85,17 @@ pub enum Crossing {
 
 impl<'s> Vertex<'s> {
     /// At a point that is seen along −`back`; `None` where the shading normal faces away though the surface
-    /// does not: such a point scatters nothing.
-    pub fn new(at: Interaction<'s>, back: Vec3) -> Option<Self> {
+    /// does not: such a point scatters nothing. Scatters by no letter but `letters`.
+    pub fn new(at: Interaction<'s>, back: Vec3, letters: Letters) -> Option<Self> {
         let wo = at.shading.to_local(back);
-        let side = 1.0_f32.copysign(back.dot(at.ng));
-        let visible = wo.z * side > 0.0;
-        visible.then(|| Self { bsdf: Bsdf::from_surface(&at.surface()), at, wo, side })
+        let cos_back = back.dot(at.ng);
+        let visible = wo.z * 1.0_f32.copysign(cos_back) > 0.0;
+        visible.then(|| Self { bsdf: Bsdf::keeping(&at.surface(), letters), at, wo, cos_back })
+    }
+
+    /// Unit direction back along the path.
+    pub fn back(&self) -> Vec3 {
+        self.at.shading.to_world(self.wo)
     }
 
     /// Whether a next event can contribute.
@@ -68,15 +103,21 @@ impl<'s> Vertex<'s> {
         self.bsdf.is_smooth_anywhere()
     }
 
-    /// f · |cos θ| towards `direction` and the density with which it would have been sampled; zero where geometric
-    /// and shading normal disagree on its side.
-    pub fn evaluate(&self, direction: Vec3, transport: Transport) -> (Rgb, f32) {
+    /// f · |cos θ| towards `direction`, by letter, and the density with which it would have been sampled; zero where
+    /// geometric and shading normal disagree on its side.
+    pub fn evaluate(&self, direction: Vec3, transport: Transport) -> (Scattered, f32) {
         let wi = self.at.shading.to_local(direction);
-        if wi.z * direction.dot(self.at.ng) <= 0.0 {
-            return (Vec3::ZERO, 0.0);
+        let cos = direction.dot(self.at.ng);
+        if wi.z * cos <= 0.0 {
+            return (Scattered::default(), 0.0);
         }
         let (value, pdf) = self.bsdf.eval_and_pdf(self.wo, wi, transport);
-        (value.total(), pdf)
+        (value * self.adjoint(wi, cos, transport), pdf)
+    }
+
+    /// Density over solid angle with which a path that arrives from `direction` would go on the way this one came.
+    pub fn reverse_pdf(&self, direction: Vec3) -> f32 {
+        self.bsdf.pdf(self.at.shading.to_local(direction), self.wo)
     }
 
     /// Samples a continuation; `None` where the path ends.
@@ -87,21 +128,50 @@ impl<'s> Vertex<'s> {
         if sample.wi.z * cos <= 0.0 {
             return None;
         }
+        let adjoint = self.adjoint(sample.wi, cos, transport);
         let (weight, density) = match sample.kind {
-            SampleKind::Smooth { value, pdf } => (value.total() / pdf, Density::SolidAngle(pdf)),
-            SampleKind::Specular { weight, .. } => (weight, Density::Delta),
+            SampleKind::Smooth { value, pdf } => {
+                (Weight::Smooth(value * (adjoint / pdf)), Density::SolidAngle(pdf))
+            }
+            SampleKind::Specular { letter, weight, .. } => {
+                (Weight::Specular(letter, weight * adjoint), Density::Delta)
+            }
         };
-        let crossing = if cos * self.side > 0.0 { Crossing::Stays } else { Crossing::Crosses };
+        let crossing = self.crossing(direction);
         Some(Continuation { direction, weight, density, eta: sample.eta, crossing })
+    }
+
+    /// Whether a direction is on the side the path came from.
+    pub fn crossing(&self, direction: Vec3) -> Crossing {
+        if direction.dot(self.at.ng) * self.cos_back > 0.0 { Crossing::Stays } else { Crossing::Crosses }
+    }
+
+    /// |cos θ| of a direction and the geometric normal.
+    #[inline]
+    pub fn cos(&self, direction: Vec3) -> f32 {
+        direction.dot(self.at.ng).abs()
     }
 
     /// The point moved off the surface towards `direction`.
     pub fn leave(&self, direction: Vec3) -> Vec3 {
-        offset_origin(self.at.position, self.at.error, self.at.ng, direction)
+        self.at.leave(direction)
     }
 
     /// The ray that leaves towards `direction`.
     pub fn ray(&self, direction: Vec3) -> Ray {
         Ray::new(self.leave(direction), direction)
+    }
+
+    /// Shading normals are no symmetric part of a BSDF: light that is carried from its source counts
+    /// |wo·Ns| |wi·Ng| / (|wo·Ng| |wi·Ns|) times as much (Veach 1997, eq. 5.19).
+    #[inline]
+    fn adjoint(&self, wi: Vec3, cos: f32, transport: Transport) -> f32 {
+        match transport {
+            Transport::Radiance => 1.0,
+            Transport::Importance => {
+                let bent = (self.wo.z * cos / (self.cos_back * wi.z)).abs();
+                if bent.is_finite() { bent } else { 0.0 }
+            }
+        }
     }
 }

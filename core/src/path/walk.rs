@@ -1,15 +1,20 @@
-//! The walk from the eye: what each ray finds, and where it goes on.
+//! A walk from the eye or from a light: what each ray finds, and where it goes on.
 
 use crate::bsdf::event::Transport;
 use crate::math::colour::Rgb;
+use crate::path::connect::light_vertex::LightStart;
 use crate::path::media::Media;
-use crate::path::next_event::{balance, next_event};
+use crate::path::mis::exhaustive::{Ends, Link};
+use crate::path::mis::partial::Partial;
+use crate::path::rules::{Rules, Weighing};
+use crate::path::tally::Tally;
+use crate::path::throughput::{State, Throughput};
 use crate::path::vertex::{Continuation, Crossing, Density, Vertex};
 use crate::sampler::{Dimension, Sampler, Use};
 use crate::scene::Scene;
 use crate::scene::interaction::Interaction;
-use crate::settings::Shadows;
 use crate::trace::ray::Ray;
+use core::marker::PhantomData;
 use glam::Vec3;
 
 /// Scatterings before which no walk is ended by roulette. Measured as error² · time, smaller is better, from 2, 5 and
@@ -22,132 +27,250 @@ const ROULETTE_FROM: u32 = 5;
 /// probability does not achieve.
 const LONG: u32 = 2048;
 
-/// What of a walk depends on the settings.
-#[derive(Clone, Copy, Debug)]
-pub struct WalkRules {
-    /// Most scatterings.
-    pub bounces: u32,
-    /// Whether direct light is blocked.
-    pub shadows: Shadows,
-}
-
-/// A walk from the eye, between two vertices.
-struct Walk<'a> {
-    scene: &'a Scene,
-    sampler: &'a Sampler,
-    ray: Ray,
-    /// How the ray's direction was chosen, and the point it was chosen at.
-    density: Density,
-    from: Vec3,
-    /// Light that arrives along the ray counts this much.
-    throughput: Rgb,
-    /// The part of `throughput` that is due to refraction: it comes back when the path leaves.
+/// A walk, between two vertices.
+#[derive(Clone, Debug)]
+pub struct Walk<'a, S: State, T: Throughput<S>> {
+    /// Where it is.
+    pub scene: &'a Scene,
+    /// What counts.
+    pub rules: &'a Rules,
+    /// Its numbers.
+    pub sampler: &'a Sampler,
+    /// Where it goes.
+    pub edge: Edge,
+    /// What a unit of light (from the eye) or of importance (from a light) at its end counts at its start.
+    pub carried: T,
+    /// What techniques are behind it.
+    pub partial: Partial,
+    /// The solids it is inside of.
+    pub media: Media,
+    /// Scatterings so far.
+    pub scatterings: u32,
+    /// Its vertices so far, where weights are computed from all of them.
+    pub links: Vec<Link>,
+    transport: Transport,
+    /// The part of its throughput that is due to refraction: it comes back when the path leaves.
     eta_squared: f32,
-    media: Media,
-    scatterings: u32,
+    /// One over the throughput it began with.
+    scale: f32,
+    state: PhantomData<S>,
 }
 
-/// Radiance along `ray`, one sample of it: emission that is hit and next events at every vertex, weighted by the
-/// balance heuristic. Adds to `rays` what it traces.
-pub fn radiance(scene: &Scene, rules: WalkRules, ray: Ray, sampler: &Sampler, rays: &mut u64) -> Rgb {
-    let mut walk = Walk {
-        scene,
-        sampler,
-        from: ray.origin,
-        ray,
-        density: Density::Delta,
-        throughput: Vec3::ONE,
-        eta_squared: 1.0,
-        media: Media::VACUUM,
-        scatterings: 0,
-    };
-    let mut radiance = Vec3::ZERO;
-    loop {
-        *rays += 1;
-        let key = || sampler.key(Dimension::Eye(walk.scatterings, Use::Alpha));
-        let Some(hit) = scene.closest(&walk.ray, key) else {
-            return radiance + walk.throughput * walk.environment_light();
-        };
-        let at = scene.data.interaction(hit.instance, hit.triangle, hit.barycentric);
-        let back = -walk.ray.direction;
-        let distance = (at.position - walk.ray.origin).length();
-        walk.throughput *= walk.media.transmittance_to(distance, &at, back);
-        radiance += walk.throughput * walk.surface_light(&at, (hit.instance, hit.triangle));
-        if walk.scatterings >= rules.bounces {
-            return radiance;
-        }
-        let Some(vertex) = Vertex::new(at, back) else { return radiance };
-        if vertex.is_smooth() {
-            let direct =
-                next_event(scene, &vertex, &walk.media, rules.shadows, sampler, walk.scatterings, rays);
-            radiance += walk.throughput * direct;
-        }
-        if !walk.scatter(&vertex) {
-            return radiance;
-        }
-    }
+/// The edge that a walk is on.
+#[derive(Clone, Copy, Debug)]
+pub struct Edge {
+    /// The ray.
+    pub ray: Ray,
+    /// The point that its direction was chosen at.
+    pub from: Vec3,
+    /// |cos θ| there; one at points and for light from infinitely far.
+    pub cos: f64,
+    /// How it was chosen.
+    pub density: Density,
+    /// Over what.
+    pub kind: EdgeKind,
 }
 
-impl Walk<'_> {
-    /// Environment light along the ray, weighted against next events.
-    fn environment_light(&self) -> Rgb {
-        let Some(environment) = &self.scene.environment else { return Vec3::ZERO };
-        let direction = self.ray.direction;
-        let weight = match self.density {
-            Density::Delta => 1.0,
-            Density::SolidAngle(pdf) => {
-                balance(pdf, self.scene.lights.environment_pdf(environment, direction))
-            }
-        };
-        environment.radiance(direction) * weight
+/// What the density of an edge is over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EdgeKind {
+    /// Directions at a point.
+    Directions,
+    /// Places of parallel rays: the first edge from infinitely far, or from an orthographic camera.
+    Parallel,
+}
+
+/// What happens on a walk.
+pub trait Visitor<'a, S: State, T: Throughput<S>> {
+    /// Whether weights need the densities of the way back.
+    const TWO_WAY: bool;
+
+    /// The ray left the scene.
+    fn escapes(&mut self, walk: &Walk<'a, S, T>, tally: &mut Tally);
+
+    /// The ray met a surface. `walk.partial` counts up to here.
+    fn arrives(
+        &mut self,
+        walk: &mut Walk<'a, S, T>,
+        at: &Interaction<'a>,
+        triangle: (u32, u32),
+        tally: &mut Tally,
+    );
+
+    /// Whether the surface's scattering is of interest.
+    fn goes_on(&self, _: &Walk<'a, S, T>) -> bool {
+        true
     }
 
-    /// Light that the surface that was hit emits along the ray, weighted against next events.
-    fn surface_light(&self, at: &Interaction<'_>, triangle: (u32, u32)) -> Rgb {
-        if !at.material.emits() {
-            return Vec3::ZERO;
+    /// The surface scatters.
+    fn scatters(&mut self, walk: &Walk<'a, S, T>, vertex: &Vertex<'a>, tally: &mut Tally);
+}
+
+impl<'a, S: State, T: Throughput<S>> Walk<'a, S, T> {
+    /// A walk along its first edge.
+    pub fn new(
+        (scene, rules, sampler): (&'a Scene, &'a Rules, &'a Sampler),
+        transport: Transport,
+        edge: Edge,
+        carried: T,
+        partial: Partial,
+    ) -> Self {
+        let scale = 1.0 / carried.total().max_element().max(f32::MIN_POSITIVE);
+        Self {
+            scene,
+            rules,
+            sampler,
+            edge,
+            carried,
+            partial,
+            media: Media::VACUUM,
+            scatterings: 0,
+            links: Vec::new(),
+            transport,
+            eta_squared: 1.0,
+            scale,
+            state: PhantomData,
         }
-        let emission = at.emission(at.side(-self.ray.direction));
-        if emission == Vec3::ZERO {
-            return Vec3::ZERO;
-        }
-        let weight = match self.density {
-            Density::Delta => 1.0,
-            Density::SolidAngle(pdf) => {
-                let (data, lights) = (&self.scene.data, &self.scene.lights);
-                balance(pdf, lights.triangle_pdf(data, triangle, self.from, at, self.ray.direction))
+    }
+
+    /// Goes on until roulette, the rules or the scene end it.
+    pub fn run(mut self, visitor: &mut impl Visitor<'a, S, T>, tally: &mut Tally) {
+        loop {
+            tally.rays += 1;
+            let key = || self.sampler.key(self.dimension(Use::Alpha));
+            let Some(hit) = self.scene.closest(&self.edge.ray, key) else {
+                visitor.escapes(&self, tally);
+                return;
+            };
+            let at = self.scene.data.interaction(hit.instance, hit.triangle, hit.barycentric);
+            self.arrive(&at);
+            visitor.arrives(&mut self, &at, (hit.instance, hit.triangle), tally);
+            if self.scatterings >= self.rules.bounces || !visitor.goes_on(&self) {
+                return;
             }
-        };
-        emission * weight
+            let Some(vertex) = Vertex::new(at, -self.edge.ray.direction, self.rules.letters) else { return };
+            visitor.scatters(&self, &vertex, tally);
+            if !self.scatter(&vertex, visitor) {
+                return;
+            }
+        }
+    }
+
+    /// The dimension of a number at the next scattering.
+    pub fn dimension(&self, what: Use) -> Dimension {
+        match self.transport {
+            Transport::Radiance => Dimension::Eye(self.scatterings, what),
+            Transport::Importance => Dimension::Light(self.scatterings, what),
+        }
+    }
+
+    /// Whether weights are computed from all densities.
+    pub fn keeps_links(&self) -> bool {
+        matches!(self.rules.weighing, Weighing::Chosen(_))
+    }
+
+    /// Density of a place on the lens, where it has extent.
+    pub fn lens(&self) -> Option<f64> {
+        self.scene.view.lens_pdf()
+    }
+
+    /// What the ends of a path admit that begins at a light like this.
+    pub fn ends(&self, start: LightStart) -> Ends {
+        Ends {
+            next_event: start.next_event,
+            light_is_hit: start.is_hit,
+            lens: self.lens(),
+            light_paths: self.rules.light_paths,
+        }
+    }
+
+    /// Squared length of the edge up to `position`, or one where its density is over places.
+    pub fn squared(&self, position: Vec3) -> f64 {
+        match self.edge.kind {
+            EdgeKind::Directions => f64::from((position - self.edge.from).length_squared()),
+            EdgeKind::Parallel => 1.0,
+        }
+    }
+
+    fn arrive(&mut self, at: &Interaction<'_>) {
+        let back = -self.edge.ray.direction;
+        let distance = (at.position - self.edge.ray.origin).length();
+        self.carried.scale(self.media.transmittance_to(distance, at, back));
+        let (squared, cos) = (self.squared(at.position), f64::from(back.dot(at.ng).abs()));
+        self.partial.arrive(self.rules.heuristic(), squared, cos);
+        if self.keeps_links() {
+            let forward = self.edge.density.over_solid_angle() * cos / squared;
+            let jacobian = self.edge.cos / squared;
+            self.links.push(Link { forward, reverse: 0.0, jacobian, specular: false });
+        }
     }
 
     /// Goes on from `vertex`; false where the walk ends. Roulette survives with min(1, throughput without the
     /// factors of refraction): never capped, since a cap below 1 has infinite variance where albedos are near one.
-    fn scatter(&mut self, vertex: &Vertex<'_>) -> bool {
-        let dimension = |what| Dimension::Eye(self.scatterings, what);
-        let choice = self.sampler.pair(dimension(Use::Choice));
-        let u = self.sampler.pair(dimension(Use::Direction));
-        let Some(next) = vertex.sample(choice.x, u, Transport::Radiance) else { return false };
+    fn scatter<V: Visitor<'a, S, T>>(&mut self, vertex: &Vertex<'_>, _: &V) -> bool {
+        let choice = self.sampler.pair(self.dimension(Use::Choice));
+        let u = self.sampler.pair(self.dimension(Use::Direction));
+        let Some(next) = vertex.sample(choice.x, u, self.transport) else { return false };
         let Continuation { direction, weight, density, eta, crossing } = next;
-        self.throughput *= weight;
-        self.eta_squared *= eta * eta;
-        self.scatterings += 1;
-        if self.scatterings >= ROULETTE_FROM {
-            let mut survival = (self.throughput.max_element() * self.eta_squared).min(1.0);
-            if self.scatterings >= LONG {
-                survival *= 1.0 - 2.0 / self.scatterings as f32;
-            }
-            if choice.y >= survival {
-                return false;
-            }
-            self.throughput /= survival;
+        self.carried = self.carried.scattered(&self.rules.language, weight);
+        if self.carried.is_dead() {
+            return false;
         }
+        self.eta_squared *= match self.transport {
+            Transport::Radiance => eta * eta,
+            Transport::Importance => 1.0,
+        };
+        self.scatterings += 1;
+        if self.scatterings >= ROULETTE_FROM && !self.survives(choice.y) {
+            return false;
+        }
+        let cos = f64::from(vertex.cos(direction));
+        self.look_back::<V>(vertex, direction, density, cos);
         if crossing == Crossing::Crosses {
             self.media.cross(&vertex.at, direction);
         }
-        self.from = vertex.at.position;
-        self.ray = vertex.ray(direction);
-        self.density = density;
+        let ray = vertex.ray(direction);
+        self.edge = Edge { ray, from: vertex.at.position, cos, density, kind: EdgeKind::Directions };
         true
+    }
+
+    fn survives(&mut self, u: f32) -> bool {
+        let throughput = self.carried.total().max_element() * self.eta_squared * self.scale;
+        let mut survival = throughput.min(1.0);
+        if self.scatterings >= LONG {
+            survival *= 1.0 - 2.0 / self.scatterings as f32;
+        }
+        if u >= survival {
+            return false;
+        }
+        self.carried.scale(Rgb::splat(1.0 / survival));
+        true
+    }
+
+    /// What weights keep of a scattering.
+    fn look_back<V: Visitor<'a, S, T>>(
+        &mut self,
+        vertex: &Vertex<'_>,
+        direction: Vec3,
+        density: Density,
+        cos: f64,
+    ) {
+        let h = self.rules.heuristic();
+        let Density::SolidAngle(forward) = density else {
+            self.partial.scatter_specular(h, cos);
+            self.remember(1.0, density);
+            return;
+        };
+        let reverse = if V::TWO_WAY { f64::from(vertex.reverse_pdf(direction)) } else { 0.0 };
+        self.partial.scatter(h, f64::from(forward), reverse, cos);
+        self.remember(reverse, density);
+    }
+
+    fn remember(&mut self, reverse: f64, density: Density) {
+        let Some(last) = self.links.len().checked_sub(1) else { return };
+        self.links[last].specular = density == Density::Delta;
+        if let Some(before) = last.checked_sub(1) {
+            self.links[before].reverse = reverse * self.links[last].jacobian;
+        }
     }
 }

@@ -1,7 +1,6 @@
 //! One look around from a point: light straight from sources, and the diffuse surface behind one direction.
 
 use crate::math::colour::Rgb;
-use crate::math::robust::offset_origin;
 use crate::math::warp;
 use crate::radiosity::element::Element;
 use crate::radiosity::patch::{Patch, Patches};
@@ -126,7 +125,7 @@ impl Surroundings<'_> {
         let environment = scene.environment.as_ref();
         let sampled =
             scene.lights.sample(&scene.data, environment, at.position, numbers.light, numbers.place);
-        let Some(event) = sampled else { return Rgb::ZERO };
+        let Some((_, event)) = sampled else { return Rgb::ZERO };
         let (f, pdf) = value(event.direction);
         let weight = match (event.found_by, self.sources) {
             (FoundBy::NextEvent, _) => 1.0,
@@ -136,7 +135,7 @@ impl Surroundings<'_> {
         if f == Rgb::ZERO || weight == 0.0 {
             return Rgb::ZERO;
         }
-        let origin = offset_origin(at.position, at.error, at.ng, event.direction);
+        let origin = at.leave(event.direction);
         let ray = match event.end {
             ShadowEnd::Point(end) => Ray { origin, direction: end - origin, t_max: 1.0 },
             ShadowEnd::Infinity => Ray::new(origin, event.direction),
@@ -166,7 +165,7 @@ impl Surroundings<'_> {
             Sources::Sampled => pdf / (pdf + light_pdf),
         };
         *rays += 1;
-        let origin = offset_origin(at.position, at.error, at.ng, direction);
+        let origin = at.leave(direction);
         let Some(hit) = scene.closest(&Ray::new(origin, direction), || key) else {
             let Some(environment) = &scene.environment else { return (Rgb::ZERO, None) };
             let light_pdf = scene.lights.environment_pdf(environment, direction);

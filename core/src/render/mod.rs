@@ -2,6 +2,10 @@
 
 pub mod batch;
 pub mod inspect;
+mod passes;
 pub mod prepare;
 pub mod profile;
 pub mod progress;
+mod sample;
+mod splats;
+mod tile;

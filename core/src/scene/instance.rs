@@ -1,6 +1,7 @@
 //! A mesh at a place.
 
 use crate::scene::mesh::MeshId;
+use crate::trace::instance::Moved as Traced;
 use glam::{Affine3A, DAffine3, DMat3, Mat3A, Vec3};
 
 /// A mesh at a place.
@@ -16,6 +17,7 @@ pub struct Instance {
 
 /// Where an instance stands.
 #[derive(Clone, Copy, Debug)]
+#[expect(clippy::large_enum_variant, reason = "all instances are moved but one at most, the gathered mesh")]
 pub enum Placement {
     /// The mesh's vertices are the scene's already.
     World,
@@ -32,6 +34,8 @@ pub struct Moved {
     pub normal_to_world: Mat3A,
     /// Whether the transform mirrors.
     pub handedness: Handedness,
+    /// What rays need of it.
+    pub traced: Traced,
 }
 
 /// Whether a transform mirrors.
@@ -88,10 +92,14 @@ impl Moved {
         let normals = normal_matrix(&matrix);
         let longest = normals.x_axis.length().max(normals.y_axis.length()).max(normals.z_axis.length());
         let normals = normals * (1.0 / longest);
-        usable.then(|| Self {
+        if !usable {
+            return None;
+        }
+        Some(Self {
             to_world: rounded,
             normal_to_world: Mat3A::from(normals.as_mat3()),
             handedness: Handedness::of(&matrix),
+            traced: Traced::new(rounded)?,
         })
     }
 }

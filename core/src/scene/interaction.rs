@@ -3,12 +3,12 @@
 use crate::bsdf::surface::SurfaceParameters;
 use crate::math::colour::Rgb;
 use crate::math::frame::Frame;
-use crate::math::robust::gamma;
 use crate::scene::data::SceneData;
 use crate::scene::instance::{Handedness, Placement};
 use crate::scene::material::{Material, Sides, SurfaceCoordinates};
 use crate::scene::mesh::Mesh;
 use crate::scene::texture::Texture;
+use crate::trace::surface_point::SurfacePoint;
 use glam::{Vec2, Vec3, Vec4};
 
 /// A side of a surface.
@@ -25,8 +25,6 @@ pub enum Side {
 pub struct Interaction<'a> {
     /// Where, in the scene's space.
     pub position: Vec3,
-    /// Bound on the error of `position`, by axis.
-    pub error: Vec3,
     /// Unit geometric normal, on the front side.
     pub ng: Vec3,
     /// Shading frame; its `z` is the interpolated and mapped normal, on the front side too.
@@ -36,6 +34,7 @@ pub struct Interaction<'a> {
     /// The material.
     pub material: &'a Material,
     textures: &'a [Texture],
+    point: SurfacePoint,
 }
 
 impl SceneData {
@@ -65,13 +64,17 @@ impl SceneData {
         let material = &self.materials[mesh.materials[triangle as usize].index()];
         let weights = weights(barycentric);
         let corners = mesh.corners(triangle);
-        let (position, error) = place(&instance.placement, corners, weights);
-        let ng = geometric_normal(&instance.placement, corners);
+        let moved = match &instance.placement {
+            Placement::World => None,
+            Placement::Moved(moved) => Some(&moved.traced),
+        };
+        let point = SurfacePoint::new(corners, barycentric, moved);
+        let ng = point.normal;
         let at = coordinates(mesh, triangle, weights);
         let shading = shading_frame(mesh, triangle, weights, &instance.placement, ng, || {
             material.mapped_normal(&self.textures, &at)
         });
-        Interaction { position, error, ng, shading, at, material, textures: &self.textures }
+        Interaction { position: point.position, ng, shading, at, material, textures: &self.textures, point }
     }
 }
 
@@ -83,35 +86,6 @@ fn weights(barycentric: Vec2) -> Vec3 {
 #[inline]
 fn mix<T: Copy + std::ops::Mul<f32, Output = T> + std::ops::Add<Output = T>>(v: [T; 3], w: Vec3) -> T {
     v[0] * w.x + v[1] * w.y + v[2] * w.z
-}
-
-/// Point and error bound: γ₇ Σ|bᵢvᵢ| for the combination, a transform adds its own rounding and carries the
-/// error through (pbrt §6.8). The largest axis counts for all: a triangle in the plane y = 0 has no error in y,
-/// but the distance along a ray is computed from all three, and with the axes apart 2 % of the light between a
-/// floor at 0 and a lamp near it was lost to hits on the floor itself.
-fn place(placement: &Placement, corners: [Vec3; 3], weights: Vec3) -> (Vec3, Vec3) {
-    let position = mix(corners, weights);
-    let magnitude = mix(corners.map(Vec3::abs), weights.abs());
-    let error = Vec3::splat(magnitude.max_element() * gamma(7.0));
-    match placement {
-        Placement::World => (position, error),
-        Placement::Moved(moved) => {
-            let m = moved.to_world.matrix3;
-            let absolute =
-                |v: Vec3| Vec3::from(m.x_axis.abs() * v.x + m.y_axis.abs() * v.y + m.z_axis.abs() * v.z);
-            let translation = Vec3::from(moved.to_world.translation).abs();
-            let rounding = (absolute(position.abs()) + translation) * gamma(3.0);
-            let error = absolute(error) * (1.0 + gamma(3.0)) + rounding;
-            (moved.to_world.transform_point3(position), Vec3::splat(error.max_element()))
-        }
-    }
-}
-
-/// Unit normal by winding, from differences taken in double precision: slivers keep theirs.
-fn geometric_normal(placement: &Placement, corners: [Vec3; 3]) -> Vec3 {
-    let [a, b, c] = corners.map(Vec3::as_dvec3);
-    let normal = (b - a).cross(c - a).normalize_or_zero().as_vec3();
-    placement.normal(normal)
 }
 
 fn coordinates(mesh: &Mesh, triangle: u32, weights: Vec3) -> SurfaceCoordinates {
@@ -172,6 +146,19 @@ fn front(normal: Vec3, ng: Vec3) -> Vec3 {
 }
 
 impl Interaction<'_> {
+    /// Bound on the error of `position`, on every axis.
+    #[inline]
+    pub fn error(&self) -> f32 {
+        self.point.error
+    }
+
+    /// Where a ray that leaves in `direction` must start so that it does not meet this surface again and stays on this
+    /// side of the neighbouring ones.
+    #[inline]
+    pub fn leave(&self, direction: Vec3) -> Vec3 {
+        self.point.leave(direction)
+    }
+
     /// The side that a direction away from the surface leaves on.
     #[inline]
     pub fn side(&self, direction: Vec3) -> Side {

@@ -1,7 +1,6 @@
 //! One light, and next events towards it.
 
 use crate::math::colour::Rgb;
-use crate::math::robust::offset_origin;
 use crate::math::spherical_triangle::SphericalTriangle;
 use crate::math::warp;
 use crate::scene::data::SceneData;
@@ -42,6 +41,8 @@ pub struct NextEvent {
     pub radiance: Rgb,
     /// Density over solid angle at the point; one for a light without extent.
     pub pdf: f32,
+    /// |cos θ| at the light's surface; one for other lights.
+    pub cos: f32,
     /// Whether directions sampled from a BSDF can find this light, too.
     pub found_by: FoundBy,
     /// Where the shadow ray ends.
@@ -87,6 +88,7 @@ impl Light {
                     direction,
                     radiance,
                     pdf,
+                    cos: 1.0,
                     found_by,
                     end: ShadowEnd::Infinity,
                 })
@@ -149,18 +151,19 @@ fn sample_triangle(
         Some(solid_angle) => 1.0 / solid_angle,
         None => distance * distance / (cos.abs() * area(corners)).max(f32::MIN_POSITIVE),
     };
-    let end = ShadowEnd::Point(offset_origin(at.position, at.error, at.ng, -direction));
+    let end = ShadowEnd::Point(at.leave(-direction));
     (pdf.is_finite() && pdf > 0.0).then_some(NextEvent {
         direction,
         radiance,
         pdf,
+        cos: cos.abs(),
         found_by: FoundBy::Both,
         end,
     })
 }
 
 /// Weights of the second and third corner as the mesh has them, from those of [`SceneData::corners`].
-fn mesh_order(data: &SceneData, instance: u32, barycentric: Vec2) -> Vec2 {
+pub(super) fn mesh_order(data: &SceneData, instance: u32, barycentric: Vec2) -> Vec2 {
     match data.instances[instance as usize].placement.handedness() {
         Handedness::Kept => barycentric,
         Handedness::Mirrored => Vec2::new(barycentric.y, barycentric.x),
@@ -201,6 +204,7 @@ fn sample_punctual(kind: &PunctualKind, point: Vec3) -> Option<NextEvent> {
         direction,
         radiance,
         pdf: 1.0,
+        cos: 1.0,
         found_by: FoundBy::NextEvent,
         end,
     })

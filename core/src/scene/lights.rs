@@ -81,7 +81,37 @@ impl Lights {
         self.all.is_empty()
     }
 
-    /// A next event from `point`; its density includes the choice of the light.
+    /// One of them, in proportion to its power, and the probability of that.
+    pub(super) fn choose(&self, choice: f32) -> Option<(u32, f32)> {
+        if self.all.is_empty() {
+            return None;
+        }
+        let (index, probability, _) = self.choice.sample(choice);
+        Some((index as u32, probability))
+    }
+
+    /// The light of a number.
+    pub fn light(&self, number: u32) -> &Light {
+        &self.all[number as usize]
+    }
+
+    /// Number of a triangle's light; `None` where it is none.
+    pub fn of_triangle(&self, (instance, triangle): (u32, u32)) -> Option<u32> {
+        let light = *self.by_triangle[instance as usize].get(triangle as usize)?;
+        (light != NONE).then_some(light)
+    }
+
+    /// Number of the environment's light.
+    pub fn of_environment(&self) -> Option<u32> {
+        self.environment
+    }
+
+    /// Probability with which a light is chosen.
+    pub fn probability(&self, number: u32) -> f32 {
+        self.choice.probability(number as usize)
+    }
+
+    /// A light's number and a next event from `point` to it; its density includes the choice of the light.
     pub fn sample(
         &self,
         data: &SceneData,
@@ -89,13 +119,10 @@ impl Lights {
         point: Vec3,
         choice: f32,
         place: Vec2,
-    ) -> Option<NextEvent> {
-        if self.all.is_empty() {
-            return None;
-        }
-        let (index, probability, _) = self.choice.sample(choice);
-        let event = self.all[index].sample(data, environment, point, place)?;
-        Some(NextEvent { pdf: event.pdf * probability, ..event })
+    ) -> Option<(u32, NextEvent)> {
+        let (light, probability) = self.choose(choice)?;
+        let event = self.light(light).sample(data, environment, point, place)?;
+        Some((light, NextEvent { pdf: event.pdf * probability, ..event }))
     }
 
     /// Density over solid angle at `point` of next events towards `at`, seen in `direction` on a triangle; zero
@@ -108,10 +135,28 @@ impl Lights {
         at: &Interaction<'_>,
         direction: Vec3,
     ) -> f32 {
-        match self.by_triangle[instance as usize].get(triangle as usize) {
-            Some(&light) if light != NONE => {
+        match self.of_triangle((instance, triangle)) {
+            Some(light) => {
                 let pdf = triangle_pdf(data, instance, triangle, point, at, direction);
-                pdf * self.choice.probability(light as usize)
+                pdf * self.probability(light)
+            }
+            None => 0.0,
+        }
+    }
+
+    /// Density over solid angle at `point` of next events towards `at`, a point of the light of a number, seen in
+    /// `direction`; zero for a light without extent.
+    pub fn light_pdf(
+        &self,
+        data: &SceneData,
+        light: u32,
+        point: Vec3,
+        at: &Interaction<'_>,
+        direction: Vec3,
+    ) -> f32 {
+        match *self.light(light) {
+            Light::Triangle { instance, triangle } => {
+                self.triangle_pdf(data, (instance, triangle), point, at, direction)
             }
             _ => 0.0,
         }
@@ -119,8 +164,7 @@ impl Lights {
 
     /// Density over solid angle of next events in `direction` towards the environment.
     pub fn environment_pdf(&self, environment: &Environment, direction: Vec3) -> f32 {
-        self.environment
-            .map_or(0.0, |light| environment.pdf(direction) * self.choice.probability(light as usize))
+        self.environment.map_or(0.0, |light| environment.pdf(direction) * self.probability(light))
     }
 }
 

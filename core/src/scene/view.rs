@@ -9,18 +9,18 @@ use glam::{Vec2, Vec3};
 /// A camera with a frame to fill and a lens.
 #[derive(Clone, Debug)]
 pub struct View {
-    position: Vec3,
+    pub(super) position: Vec3,
     /// To the right edge, the top edge and the middle of the frame, from the eye (of an orthographic camera: the
     /// first two from the middle, the third a unit vector).
-    right: Vec3,
-    up: Vec3,
-    forward: Vec3,
-    projection: ViewProjection,
-    size: Vec2,
+    pub(super) right: Vec3,
+    pub(super) up: Vec3,
+    pub(super) forward: Vec3,
+    pub(super) projection: ViewProjection,
+    pub(super) size: Vec2,
 }
 
 #[derive(Clone, Copy, Debug)]
-enum ViewProjection {
+pub(super) enum ViewProjection {
     Pinhole,
     /// Radius of the lens and distance of the plane in focus, in scene units, along unit axes.
     Lens {

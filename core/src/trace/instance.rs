@@ -22,12 +22,12 @@ pub struct Instance {
     /// From the mesh's space to the world's.
     pub to_world: Affine3A,
     /// `None` where `to_world` is the identity.
-    pub(super) moved: Option<Moved>,
+    pub moved: Option<Moved>,
 }
 
 /// What follows from a transform that is not the identity. Matrices are rows.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Moved {
+pub struct Moved {
     /// The linear part of `to_world`.
     linear: [Vec3; 3],
     /// Its inverse, made in f64.
@@ -58,7 +58,8 @@ impl Instance {
 }
 
 impl Moved {
-    fn new(to_world: Affine3A) -> Option<Self> {
+    /// `None` where the transform is not finite or cannot be inverted.
+    pub fn new(to_world: Affine3A) -> Option<Self> {
         let matrix = DMat3::from_cols(
             to_world.matrix3.x_axis.as_dvec3(),
             to_world.matrix3.y_axis.as_dvec3(),
@@ -104,12 +105,16 @@ impl Moved {
         (turned + self.translation, error * (1.0 + gamma(8.0)))
     }
 
-    /// The normal of the surface spanned by two edges of the mesh, in the world and of any length. In a mirrored
-    /// instance the front stays the front.
-    pub(super) fn cross_outward(&self, first: DVec3, second: DVec3) -> DVec3 {
-        let turn = |v: DVec3| DVec3::from_array(self.linear.map(|row| row.as_dvec3().dot(v)));
-        let cross = turn(first).cross(turn(second));
-        if self.mirrored { -cross } else { cross }
+    /// An edge of the mesh in the world.
+    #[inline]
+    pub(super) fn edge_outward(&self, edge: DVec3) -> DVec3 {
+        DVec3::from_array(self.linear.map(|row| row.as_dvec3().dot(edge)))
+    }
+
+    /// Whether the transform is a mirror.
+    #[inline]
+    pub(super) fn mirrors(&self) -> bool {
+        self.mirrored
     }
 
     fn bounds(&self, mesh: Bounds) -> Bounds {

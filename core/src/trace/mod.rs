@@ -10,6 +10,8 @@ pub mod build_error;
 mod collapse;
 pub mod instance;
 mod lanes;
+#[cfg(test)]
+mod leaving;
 pub mod mesh;
 mod prepared;
 pub mod ray;

@@ -1,7 +1,7 @@
 //! Bodies of requests: JSON and bytes, within limits.
 
 use super::error::ApiError;
-use crate::farm::error::fault;
+use crate::farm::{error::fault, rules::PARTIAL_BYTES_MAX};
 use axum::{
     body::{Body, Bytes},
     extract::{FromRequest, Request},
@@ -14,7 +14,7 @@ use std::fmt::Write as _;
 /// Bytes of a JSON document, at most.
 const JSON_MAX: usize = 1 << 20;
 /// Bytes of a partial EXR, at most.
-const PARTIAL_MAX: usize = 64 << 20;
+const PARTIAL_MAX: usize = PARTIAL_BYTES_MAX + (1 << 20);
 
 /// A JSON document as what it says; faults are told by their JSON pointers.
 #[derive(Debug)]

@@ -6,6 +6,7 @@ use clap::{
 };
 use ovtigre_core::{
     film::size::{Region, Size},
+    path::expression::language::Language,
     settings::Shadows,
 };
 use ovtigre_proto::{
@@ -38,8 +39,8 @@ pub(crate) struct JobFlags {
     /// Stop after this many seconds of run time [default: never].
     #[arg(long, value_name = "S", value_parser = positive)]
     pub(crate) seconds: Option<f64>,
-    /// Path expression: a word from the light to the eye [default: L(D|S)*E].
-    #[arg(long, value_name = "EXPR", conflicts_with = "preset")]
+    /// Path expression: words from the light to the eye of D, S and S_M [default: L(D|S)*E].
+    #[arg(long, value_name = "EXPR", conflicts_with = "preset", value_parser = paths)]
     pub(crate) paths: Option<String>,
     /// A path expression by its name [default: full].
     #[arg(long, value_name = "NAME", value_parser = ["phong", "whitted", "cook", "radiosity", "full"])]
@@ -47,7 +48,7 @@ pub(crate) struct JobFlags {
     /// How light is estimated [default: auto].
     #[arg(long, value_parser = named::<MethodRequest>(&["auto", "path", "light", "bidirectional", "photon", "radiosity"]))]
     pub(crate) method: Option<MethodRequest>,
-    /// A further picture of only those paths; repeatable.
+    /// A further picture of only those paths, or of a technique (s,t) of bidirectional; repeatable.
     #[arg(long = "layer", value_name = "NAME=EXPR", value_parser = layer)]
     pub(crate) layers: Vec<String>,
     /// Only these (s,t) techniques of bidirectional, such as "0,3;1,2" [default: all].
@@ -152,9 +153,25 @@ fn shutter(text: &str) -> Result<[f64; 2], String> {
     if times[0] <= times[1] { Ok(times) } else { Err("it closes before it opens".to_owned()) }
 }
 
+fn paths(text: &str) -> Result<String, String> {
+    match Language::compile(&[text]) {
+        Ok(_) => Ok(text.to_owned()),
+        Err(error) => {
+            let marked = error.marked();
+            let lines: String = marked.lines().map(|line| format!("\n  {line}")).collect();
+            Err(format!("{error}{lines}"))
+        }
+    }
+}
+
+/// What a technique makes of a layer is for the farm to judge.
 fn layer(text: &str) -> Result<String, String> {
     match text.split_once('=') {
-        Some((name, expression)) if !name.trim().is_empty() && !expression.trim().is_empty() => {
+        Some((name, shows)) if !name.trim().is_empty() && !shows.trim().is_empty() => {
+            let technique = shows.trim().starts_with('(') && shows.contains(',') && !shows.contains('{');
+            if !technique {
+                paths(shows)?;
+            }
             Ok(text.to_owned())
         }
         _ => Err("write NAME=EXPR, such as direct=LDE".to_owned()),
@@ -223,6 +240,8 @@ mod tests {
             "--method magic",
             "--layer LDE",
             "--layer =LDE",
+            "--layer a=LD",
+            "--paths L(D",
             "--weights heavy",
             "--lens-radius 1",
             "--focus-distance 1",

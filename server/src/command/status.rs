@@ -79,6 +79,18 @@ pub(crate) fn show(job: &JobStatus) {
         ("paths", job.paths.clone()),
         ("scene", job.scene.to_string()),
     ]);
+    if !job.layers.is_empty() {
+        let number = |n: Option<f64>| n.map(|n| format!("{n:.4}")).unwrap_or_default();
+        let rows: Vec<_> = (job.layers.iter())
+            .map(|layer| {
+                let error = layer.error.and_then(|e| e.relative_error);
+                let mean = layer.error.map(|e| e.mean_luminance);
+                let error = error.map(|error| format!("±{error:.4}")).unwrap_or_default();
+                [layer.name.clone(), layer.shows.clone(), number(mean), error]
+            })
+            .collect();
+        table::print(["LAYER", "SHOWS", "MEAN LUMINANCE", "ERROR"], &rows);
+    }
     for warning in &job.warnings {
         terminal::result(&format!("warning: {warning}"));
     }

@@ -5,7 +5,6 @@ use super::{
     Farm,
     error::{FarmError, Result},
     live::{Arrival, Live, View, sum_bytes},
-    spec::LAYERS,
     split::lanes,
     stop::can_end,
 };
@@ -58,12 +57,13 @@ impl Merge {
     /// No block yet, or the blobs of sums that are kept of some lanes.
     pub fn new(
         schedule: Arc<Schedule>,
+        planes: u32,
         kept: Vec<Prefix>,
         commits: Vec<CommitRow>,
         checkpoints: u32,
     ) -> Self {
         let mut prefixes: Vec<Vec<Prefix>> = (schedule.regions().iter())
-            .map(|r| (0..schedule.replicates()).map(|n| Prefix::empty(*r, n, LAYERS as usize)).collect())
+            .map(|r| (0..schedule.replicates()).map(|n| Prefix::empty(*r, n, planes as usize)).collect())
             .collect();
         let mut snapshots = BTreeMap::new();
         for prefix in kept {
@@ -238,7 +238,8 @@ impl Farm {
             kept.push(prefix.map_err(|e| FarmError::Damaged(e.to_string()))?);
         }
         let schedule = Arc::clone(&live.schedule);
-        let mut merge = Merge::new(schedule, kept, ledger.commits, ledger.checkpoints);
+        let mut merge =
+            Merge::new(schedule, live.spec.settings.planes(), kept, ledger.commits, ledger.checkpoints);
         live.arrivals().into_iter().for_each(|arrival| merge.add(arrival));
         publish(live, &merge);
         Ok(merge)

@@ -7,15 +7,18 @@ use super::{
     live::{Ending, Live, Waits},
 };
 use crate::store::row::NewCheckpoint;
-use ovtigre_core::film::error::{ErrorEstimate, estimate};
-use ovtigre_proto::{curve::CurveRow, status::JobState};
+use ovtigre_core::film::error::{ErrorEstimate, PlaneSummary, estimate, summarise};
+use ovtigre_proto::{
+    curve::{CurveRow, LayerError},
+    status::JobState,
+};
 
 impl Farm {
     /// All lanes are at a checkpoint: its row of the curve is written down. Says how the job ends,
     /// where it ends here.
     pub(super) async fn look(&self, live: &Live, held: Held) -> Result<(Held, Option<Ending>)> {
         let (mut held, found) = measure(live, held).await?;
-        let row = self.take_row(live, &mut held, found.as_ref()).await?;
+        let row = self.take_row(live, &mut held, found).await?;
         let merge = held.as_ref().expect("loaded by the caller");
         let reached = live.spec.error_target.is_some_and(|target| {
             row.relative_error_upper.is_some_and(|upper| upper <= target) && has_light(merge)
@@ -45,16 +48,12 @@ impl Farm {
             return Ok(held);
         }
         let (mut held, found) = measure(live, held).await?;
-        self.take_row(live, &mut held, found.as_ref()).await?;
+        self.take_row(live, &mut held, found).await?;
         Ok(held)
     }
 
-    async fn take_row(
-        &self,
-        live: &Live,
-        held: &mut Held,
-        found: Option<&ErrorEstimate>,
-    ) -> Result<CurveRow> {
+    async fn take_row(&self, live: &Live, held: &mut Held, measured: Measured) -> Result<CurveRow> {
+        let Measured { picture: found, layers } = measured;
         let merge = held.as_mut().expect("loaded by the caller");
         let progress = merge.progress();
         let wall_seconds = self.job_row(&live.id).await?.run_seconds;
@@ -68,19 +67,29 @@ impl Farm {
             relative_error_upper: found.and_then(|e| e.relative_upper),
         };
         merge.checkpoints += 1;
-        let checkpoint = NewCheckpoint { look: merge.checkpoints, row, progress };
+        let checkpoint = NewCheckpoint { look: merge.checkpoints, row, layers: layers.clone(), progress };
         if let Err(error) = self.store.add_checkpoint(&live.id, checkpoint).await {
             merge.checkpoints -= 1;
             return Err(error.into());
         }
-        live.set_view(|view| view.curve.push(row));
+        live.set_view(|view| {
+            view.curve.push(row);
+            view.layers = layers;
+        });
         Ok(row)
     }
 }
 
-/// The error of what is appended. An estimate that is not finite is none.
-async fn measure(live: &Live, held: Held) -> Result<(Held, Option<ErrorEstimate>)> {
+/// The errors of what is appended.
+struct Measured {
+    picture: Option<ErrorEstimate>,
+    layers: Vec<LayerError>,
+}
+
+/// The errors of what is appended. An estimate that is not finite is none.
+async fn measure(live: &Live, held: Held) -> Result<(Held, Measured)> {
     let region = live.spec.region;
+    let planes = live.spec.settings.planes() as usize;
     blocking(move || {
         let merge = held.as_ref().expect("loaded by the caller");
         let found = estimate(region, &merge.prefixes, merge.checkpoints + 1);
@@ -89,9 +98,20 @@ async fn measure(live: &Live, held: Held) -> Result<(Held, Option<ErrorEstimate>
             relative_upper: e.relative_upper.filter(|upper| upper.is_finite()),
             ..e
         });
-        (held, found)
+        let layers = (1..planes).map(|plane| layer_error(&summarise(region, &merge.prefixes, plane)));
+        let measured = Measured { picture: found, layers: layers.collect() };
+        (held, measured)
     })
     .await
+}
+
+fn layer_error(summary: &PlaneSummary) -> LayerError {
+    let finite = |error: Option<f64>| error.filter(|e| e.is_finite());
+    LayerError {
+        mean_luminance: summary.mean_luminance,
+        rms_error: finite(summary.rms),
+        relative_error: finite(summary.relative),
+    }
 }
 
 /// Whether any light was found. A picture that is black so far has no spread, and no proof either.

@@ -81,6 +81,7 @@ impl Farm {
         let _turn = self.decoders.acquire().await.map_err(|_| FarmError::Stopping)?;
         let (job, scene) = (live.id.clone(), live.scene.clone());
         let method = live.spec.settings.method.name();
+        let planes = live.spec.settings.planes() as usize;
         blocking(move || {
             let read = exr::read_partial(&partial, batch.region.pixels());
             let (sum, says) = read.map_err(|e| FarmError::Sum(e.to_string()))?;
@@ -96,8 +97,8 @@ impl Farm {
                     return Err(FarmError::Sum(format!("its {what} is '{got}', not '{expected}'")));
                 }
             }
-            if sum.planes.len() != super::spec::LAYERS as usize {
-                return Err(FarmError::Sum(format!("it has {} layers", sum.planes.len())));
+            if sum.planes.len() != planes {
+                return Err(FarmError::Sum(format!("it has {} planes, not {planes}", sum.planes.len())));
             }
             let hash = BlobId::of(sum.hash());
             Ok((sum, hash))

@@ -5,7 +5,7 @@ use crate::store::row::{BatchKey, CommitRow, JobRow, Progress};
 use bytes::Bytes;
 use ovtigre_core::film::{schedule::Schedule, sum::Sum};
 use ovtigre_proto::{
-    curve::CurveRow,
+    curve::{CurveRow, LayerError},
     id::{BlobId, JobId},
     status::JobState,
 };
@@ -52,6 +52,8 @@ pub struct View {
     pub manifest: Option<String>,
     /// Checkpoints taken.
     pub curve: Vec<CurveRow>,
+    /// The layers at the latest of them.
+    pub layers: Vec<LayerError>,
 }
 
 /// A picture's file that was made last.
@@ -90,7 +92,7 @@ pub struct Live {
 
 impl Live {
     /// Of a job in the store.
-    pub fn new(row: &JobRow, spec: JobSpec, curve: Vec<CurveRow>) -> Self {
+    pub fn new(row: &JobRow, spec: JobSpec, curve: Vec<CurveRow>, layers: Vec<LayerError>) -> Self {
         Self {
             id: row.id.clone(),
             scene: row.scene.clone(),
@@ -101,7 +103,7 @@ impl Live {
             kick: Notify::new(),
             changes: watch::Sender::new(0),
             inbox: Mutex::default(),
-            view: Mutex::new(View { progress: row.progress, manifest: None, curve }),
+            view: Mutex::new(View { progress: row.progress, manifest: None, curve, layers }),
             ending: Mutex::default(),
             made: Mutex::default(),
         }

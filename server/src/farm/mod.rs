@@ -13,6 +13,7 @@ pub mod ids;
 pub mod lease;
 pub mod live;
 pub mod open;
+pub mod paths;
 pub mod picture;
 pub mod reap;
 pub mod rules;

@@ -82,7 +82,8 @@ impl Farm {
     pub(super) async fn take_up(self: &Arc<Self>, row: &JobRow) -> Result<()> {
         let spec: JobSpec = read_spec(row)?;
         let curve = self.store.curve(&row.id).await?;
-        let live = Arc::new(Live::new(row, spec, curve));
+        let layers = self.store.layers(&row.id).await?;
+        let live = Arc::new(Live::new(row, spec, curve, layers));
         held(&self.lives).insert(row.id.clone(), Arc::clone(&live));
         if row.state.is_over() {
             live.end(Ending { state: row.state, reason: None, certified: false, waits: Waits::Not });

@@ -16,12 +16,13 @@ use futures::stream::BoxStream;
 use ovtigre_core::film::{
     develop::{Develop, png},
     estimate::picture,
-    exr::{Layers, PictureAttributes, read_layers, write_picture},
+    exr::{Layers, Part, PictureAttributes, prefix_of, read_layers, write_picture},
     size::Region,
     sum::Plane,
 };
+use ovtigre_core::{path::expression::presets::shown, settings::Settings};
 use ovtigre_proto::id::JobId;
-use std::{ops::Range, time::Duration};
+use std::{fmt, ops::Range, time::Duration};
 
 /// What a picture's files say made them.
 const SOFTWARE: &str = concat!("ovtigre ", env!("CARGO_PKG_VERSION"));
@@ -49,6 +50,8 @@ pub enum LayerName {
     Error,
     /// One of its layers.
     Named(String),
+    /// The standard error of one of its layers.
+    ErrorOf(String),
 }
 
 impl LayerName {
@@ -57,7 +60,33 @@ impl LayerName {
         match text {
             None | Some("" | "picture") => Self::Picture,
             Some("error") => Self::Error,
-            Some(name) => Self::Named(name.to_owned()),
+            Some(name) => match name.strip_suffix(".error") {
+                Some(layer) => Self::ErrorOf(layer.to_owned()),
+                None => Self::Named(name.to_owned()),
+            },
+        }
+    }
+
+    /// The number of its plane among the means or the errors of a job's picture.
+    fn plane(&self, settings: &Settings) -> Option<(usize, Part)> {
+        let layer = |name: &String| settings.layers.iter().position(|l| l.name == *name).map(|i| i + 1);
+        let (plane, part) = match self {
+            Self::Picture => (0, Part::Mean),
+            Self::Error => (0, Part::Error),
+            Self::Named(name) => (layer(name)?, Part::Mean),
+            Self::ErrorOf(name) => (layer(name)?, Part::Error),
+        };
+        (part == Part::Mean || settings.replicates > 1).then_some((plane, part))
+    }
+}
+
+impl fmt::Display for LayerName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Picture => f.write_str("picture"),
+            Self::Error => f.write_str("error"),
+            Self::Named(name) => f.write_str(name),
+            Self::ErrorOf(name) => write!(f, "{name}.error"),
         }
     }
 }
@@ -163,16 +192,14 @@ impl Farm {
     pub async fn png(&self, id: &JobId, layer: LayerName, develop: Develop) -> Result<(String, Bytes)> {
         let row = self.job_row(id).await?;
         let spec = read_spec(&row)?;
-        if let LayerName::Named(name) = layer {
-            return Err(FarmError::NoLayer(name));
-        }
-        if layer == LayerName::Error && spec.settings.replicates < 2 {
-            return Err(FarmError::NoLayer("error".to_owned()));
-        }
+        let plane = layer.plane(&spec.settings);
+        let (plane, part) = plane.ok_or_else(|| FarmError::NoLayer(layer.to_string()))?;
         let region = spec.region;
         if let (true, Some(manifest)) = (row.settled, &row.manifest) {
             let exr = self.blobs.get(&BlobName::Result(id.clone())).await?;
-            let png = blocking(move || develop_kept(&exr, region, &layer, &develop)).await??;
+            let name = plane.checked_sub(1).map(|i| spec.settings.layers[i].name.as_str());
+            let prefix = prefix_of(name, part);
+            let png = blocking(move || develop_kept(&exr, region, &prefix, &develop)).await??;
             return Ok((manifest.clone(), png));
         }
         let live = self.live(id).filter(|_| !row.settled).ok_or_else(|| FarmError::NoPicture(id.clone()))?;
@@ -183,21 +210,16 @@ impl Farm {
         let bytes = blocking(move || {
             let picture = picture(size, region, &held.as_ref().expect("just read").prefixes);
             drop(held);
-            let plane = match layer {
-                LayerName::Error => picture.error,
-                _ => picture.planes.into_iter().next(),
-            };
-            plane.map(|plane| png(region, &plane, &develop))
+            let planes = if part == Part::Mean { &picture.planes } else { &picture.errors };
+            png(region, &planes[plane], &develop)
         })
         .await?;
-        let bytes = bytes.ok_or_else(|| FarmError::NoLayer("error".to_owned()))?;
         Ok((manifest, bytes.into()))
     }
 }
 
-fn develop_kept(exr: &[u8], region: Region, layer: &LayerName, develop: &Develop) -> Result<Bytes> {
+fn develop_kept(exr: &[u8], region: Region, prefix: &str, develop: &Develop) -> Result<Bytes> {
     let layers = read_layers(exr).map_err(|e| FarmError::Damaged(e.to_string()))?;
-    let prefix = if *layer == LayerName::Error { "error." } else { "" };
     let plane = plane(&layers, region, prefix).ok_or_else(|| {
         FarmError::Damaged("the kept picture has other channels or another size".to_owned())
     })?;
@@ -205,7 +227,9 @@ fn develop_kept(exr: &[u8], region: Region, layer: &LayerName, develop: &Develop
 }
 
 fn plane(layers: &Layers, region: Region, prefix: &str) -> Option<Plane> {
-    let channel = |c| layers.channels.get(&format!("{prefix}{c}")).filter(|v| v.len() == region.pixels());
+    let dot = if prefix.is_empty() { "" } else { "." };
+    let channel =
+        |c| layers.channels.get(&format!("{prefix}{dot}{c}")).filter(|v| v.len() == region.pixels());
     let (r, g, b) = (channel("R")?, channel("G")?, channel("B")?);
     Some((0..region.pixels()).map(|i| [r[i], g[i], b[i]]).collect())
 }
@@ -220,7 +244,10 @@ fn attributes(row: &JobRow, live: &Live, progress: Progress, manifest: String) -
         samples: progress.samples,
         seed: live.spec.settings.seed,
         method: live.spec.settings.method.name().to_owned(),
-        paths: live.spec.settings.paths.clone(),
+        paths: shown(&live.spec.settings.paths).to_owned(),
+        layers: (live.spec.settings.layers.iter())
+            .map(|layer| (layer.name.clone(), layer.shows.to_string()))
+            .collect(),
         manifest,
         render_seconds: progress.worker_micros as f64 * 1e-6,
         software: SOFTWARE.to_owned(),

@@ -2,6 +2,9 @@
 
 use std::time::Duration;
 
+/// Largest partial sum that is taken, without what its file adds to it.
+pub const PARTIAL_BYTES_MAX: usize = 256 << 20;
+
 /// How long, how many, how much.
 #[derive(Clone, Copy, Debug)]
 pub struct Rules {

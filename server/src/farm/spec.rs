@@ -7,9 +7,6 @@ use ovtigre_core::{
 use ovtigre_proto::{id::BlobId, job::JobRequest};
 use serde::{Deserialize, Serialize};
 
-/// Layers of a picture, itself included.
-pub const LAYERS: u32 = 1;
-
 /// A job with every default resolved.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct JobSpec {
@@ -34,7 +31,12 @@ pub struct JobSpec {
 impl JobSpec {
     /// Its batches.
     pub fn schedule(&self) -> Schedule {
-        Schedule::new(self.region, LAYERS, self.settings.replicates, self.samples)
+        let Settings { method, replicates, .. } = self.settings;
+        if method.splats() {
+            Schedule::whole(self.region, replicates, self.samples)
+        } else {
+            Schedule::new(self.region, self.settings.planes(), replicates, self.samples)
+        }
     }
 
     /// Samples a pixel at most, over all replicates.
@@ -42,9 +44,18 @@ impl JobSpec {
         self.samples.saturating_mul(self.settings.replicates)
     }
 
-    /// Bytes of its sums in memory: three f64 a pixel, layer and replicate.
+    /// Bytes of its largest partial sum: three f32 a pixel and plane.
+    pub fn partial_bytes(&self) -> u64 {
+        let pixels = self.schedule().regions().iter().map(|region| region.pixels() as u64).max();
+        pixels.unwrap_or(0) * u64::from(self.settings.planes()) * 12
+    }
+
+    /// Bytes of its sums in memory: three f64 a pixel, plane and replicate.
     pub fn sums_bytes(&self) -> u64 {
-        self.region.pixels() as u64 * u64::from(LAYERS) * u64::from(self.settings.replicates) * 24
+        self.region.pixels() as u64
+            * u64::from(self.settings.planes())
+            * u64::from(self.settings.replicates)
+            * 24
     }
 
     /// Hash of all that a sum depends on beside its batch.

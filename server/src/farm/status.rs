@@ -5,12 +5,14 @@ use super::{
     curve::target_at,
     error::{FarmError, Result},
     open::read_spec,
+    spec::JobSpec,
 };
 use crate::store::row::{JobFilter, JobRow, Progress, WorkerRow};
+use ovtigre_core::{path::expression::presets::shown, settings::Layer};
 use ovtigre_proto::{
     curve::CurveRow,
     id::{JobId, WorkerId},
-    status::{JobState, JobStatus, Page, Scaling, WorkerState, WorkerStatus},
+    status::{JobState, JobStatus, LayerStatus, Page, Scaling, WorkerState, WorkerStatus},
 };
 
 /// Items of a page where it is not said.
@@ -57,6 +59,7 @@ impl Farm {
         let schedule = spec.schedule();
         let workers = if row.state.is_over() { 0 } else { self.store.workers_of(&row.id).await? };
         let eta_seconds = eta(row, &progress, &spec, &curve);
+        let layers = self.layers_of(&row.id, &spec).await?;
         Ok(JobStatus {
             id: row.id.clone(),
             name: row.name.clone(),
@@ -83,12 +86,28 @@ impl Farm {
             eta_seconds,
             method: spec.settings.method.name().to_owned(),
             method_reason: spec.method_reason,
-            paths: spec.settings.paths.clone(),
+            paths: shown(&spec.settings.paths).to_owned(),
+            layers,
             settings: spec.settings,
             region: spec.region,
             request: spec.request,
             warnings: spec.warnings,
         })
+    }
+
+    async fn layers_of(&self, id: &JobId, spec: &JobSpec) -> Result<Vec<LayerStatus>> {
+        let layers = &spec.settings.layers;
+        let errors = match self.live(id) {
+            _ if layers.is_empty() => Vec::new(),
+            Some(live) => live.view().layers,
+            None => self.store.layers(id).await?,
+        };
+        let status = |(i, layer): (usize, &Layer)| LayerStatus {
+            name: layer.name.clone(),
+            shows: layer.shows.to_string(),
+            error: errors.get(i).copied(),
+        };
+        Ok(layers.iter().enumerate().map(status).collect())
     }
 
     /// A worker in the store.
@@ -152,7 +171,7 @@ fn worker_status(row: WorkerRow) -> WorkerStatus {
 }
 
 /// Seconds until the first of: all samples drawn, the time over, the error reached.
-fn eta(row: &JobRow, progress: &Progress, spec: &super::spec::JobSpec, curve: &[CurveRow]) -> Option<f64> {
+fn eta(row: &JobRow, progress: &Progress, spec: &JobSpec, curve: &[CurveRow]) -> Option<f64> {
     if row.state != JobState::Running {
         return None;
     }

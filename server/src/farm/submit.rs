@@ -3,19 +3,18 @@
 use super::{
     Farm,
     error::{FarmError, Result, fault},
-    rules::Rules,
+    paths::choose,
+    rules::{PARTIAL_BYTES_MAX, Rules},
     spec::JobSpec,
 };
 use crate::store::row::{Added, IdempotencyKey, NewJob};
 use ovtigre_core::{
     film::size::{Region, Size},
-    settings::{
-        CameraChoice, Environment, EnvironmentSource, FULL, Gloss, Lens, Method, Settings, Shutter, Weights,
-    },
+    settings::{CameraChoice, Environment, EnvironmentSource, Lens, Settings, Shutter},
 };
 use ovtigre_proto::{
     id::BlobId,
-    job::{JobRequest, MethodRequest, REPLICATES_DEFAULT, SAMPLES_DEFAULT, WIDTH_DEFAULT},
+    job::{JobRequest, REPLICATES_DEFAULT, SAMPLES_DEFAULT, WIDTH_DEFAULT},
     pair::EnvironmentRequest,
     problem::Fault,
     scene::{SceneContent, SceneContents, SceneReport},
@@ -108,7 +107,7 @@ pub fn resolve(
 ) -> std::result::Result<JobSpec, Vec<Fault>> {
     let mut faults = Vec::new();
     let mut note = |pointer: &str, detail: String| faults.push(fault(pointer, detail));
-    unsupported(&request, &mut note);
+    let chosen = choose(&request, &mut note);
     numbers(&request, &mut note);
     let camera = camera(&request, scene).unwrap_or_else(|detail| {
         note("/camera", detail);
@@ -145,15 +144,15 @@ pub fn resolve(
         settings: Settings {
             size,
             camera,
-            method: Method::Path,
-            paths: FULL.to_owned(),
-            layers: Vec::new(),
-            gloss: Gloss::AsItIs,
-            strategies: Vec::new(),
-            weights: Weights::Balance,
+            method: chosen.method,
+            paths: chosen.paths,
+            layers: chosen.layers,
+            gloss: chosen.gloss,
+            strategies: chosen.strategies,
+            weights: chosen.weights,
             bounces: request.bounces,
             lens,
-            shutter: Shutter::default(),
+            shutter: request.shutter.map_or_else(Shutter::default, |[open, close]| Shutter { open, close }),
             environment: environment(&request),
             shadows: request.shadows.unwrap_or_default(),
             seed: request.seed.unwrap_or(0),
@@ -163,44 +162,11 @@ pub fn resolve(
         samples: samples / replicates,
         error_target: request.error,
         seconds: request.seconds,
-        method_reason: match request.method {
-            Some(MethodRequest::Path) => "asked for".to_owned(),
-            _ => "samples the whole rendering equation from the eye, with next event".to_owned(),
-        },
+        method_reason: chosen.reason.to_owned(),
         warnings: warnings(scene, lit, camera, samples, replicates),
         request,
     };
     fits(&spec, rules).map(|()| spec)
-}
-
-/// What this version does not render yet.
-fn unsupported(request: &JobRequest, note: &mut impl FnMut(&str, String)) {
-    let full = |text: &str| text.split_whitespace().collect::<String>() == FULL;
-    if request.paths.as_deref().is_some_and(|text| !full(text)) {
-        note("/paths", format!("only '{FULL}' is supported yet: leave 'paths' out"));
-    }
-    match request.preset.as_deref() {
-        None | Some("full") => {}
-        Some("phong" | "whitted" | "cook" | "radiosity") => {
-            note("/preset", "only 'full' is supported yet: leave 'preset' out".to_owned());
-        }
-        Some(name) => note("/preset", format!("there is no preset '{name}': 'full' is one")),
-    }
-    if !matches!(request.method, None | Some(MethodRequest::Auto | MethodRequest::Path)) {
-        note("/method", "only 'path' is supported yet: leave 'method' out".to_owned());
-    }
-    if !request.layers.is_empty() {
-        note("/layers", "layers are not supported yet: leave 'layers' out".to_owned());
-    }
-    if request.strategies.is_some() {
-        note("/strategies", "strategies are not supported yet: leave 'strategies' out".to_owned());
-    }
-    if request.weights.is_some() {
-        note("/weights", "weights are not supported yet: leave 'weights' out".to_owned());
-    }
-    if request.shutter.is_some_and(|times| times != [0.0, 0.0]) {
-        note("/shutter", "only a still, '0,0', is supported yet: leave 'shutter' out".to_owned());
-    }
 }
 
 fn numbers(request: &JobRequest, note: &mut impl FnMut(&str, String)) {
@@ -227,6 +193,14 @@ fn numbers(request: &JobRequest, note: &mut impl FnMut(&str, String)) {
         && !rgb.iter().all(|c| c.is_finite() && *c >= 0.0)
     {
         note("/environment", "a radiance has three finite numbers that are not negative".to_owned());
+    }
+    if let Some([open, close]) = request.shutter
+        && !(open.is_finite() && close.is_finite() && open <= close)
+    {
+        note(
+            "/shutter",
+            "the shutter opens and closes at finite seconds, and not before it opens".to_owned(),
+        );
     }
     if request.name.as_ref().is_some_and(|name| name.is_empty() || name.len() > NAME_MAX) {
         note("/name", format!("a name has 1 to {NAME_MAX} bytes"));
@@ -325,16 +299,27 @@ fn warnings(
 }
 
 fn fits(spec: &JobSpec, rules: &Rules) -> std::result::Result<(), Vec<Fault>> {
-    let (needs, has) = (spec.sums_bytes(), rules.sums_bytes);
-    if needs <= has {
-        return Ok(());
-    }
     let Region { width, height, .. } = spec.region;
-    let detail = format!(
-        "the sums of {width}x{height} pixels in {} replicates need {} MiB, and this farm has {} MiB: ask for a smaller picture, a region of it, or fewer replicates",
-        spec.settings.replicates,
-        needs >> 20,
-        has >> 20
-    );
-    Err(vec![fault("/size", detail)])
+    let planes = spec.settings.planes();
+    let (needs, has) = (spec.sums_bytes(), rules.sums_bytes);
+    if needs > has {
+        let detail = format!(
+            "the sums of {width}x{height} pixels in {} replicates of {planes} planes need {} MiB, and this farm has {} MiB: ask for a smaller picture, a region of it, or fewer replicates or layers",
+            spec.settings.replicates,
+            needs >> 20,
+            has >> 20
+        );
+        return Err(vec![fault("/size", detail)]);
+    }
+    let partial = spec.partial_bytes();
+    if partial > PARTIAL_BYTES_MAX as u64 {
+        let detail = format!(
+            "method '{}' brings {width}x{height} pixels of {planes} planes as one sum of {} MiB, and {} MiB is taken: ask for a smaller picture, a region of it, or fewer layers",
+            spec.settings.method.name(),
+            partial >> 20,
+            PARTIAL_BYTES_MAX >> 20
+        );
+        return Err(vec![fault("/size", detail)]);
+    }
+    Ok(())
 }

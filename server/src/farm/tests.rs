@@ -3,5 +3,6 @@
 pub(crate) mod bench;
 mod ending;
 mod faults;
+mod layers;
 mod merging;
 mod submitting;

@@ -8,7 +8,7 @@ use super::{
     },
 };
 use ovtigre_proto::{
-    curve::CurveRow,
+    curve::{CurveRow, LayerError},
     id::{BlobId, JobId, LeaseId, WorkerId},
     lease::WorkerJoin,
     scene::{SceneContent, SceneReport},
@@ -260,9 +260,14 @@ async fn curves_and_snapshots_are_kept(store: &dyn Store) {
     };
     let progress = Progress { batches: 4, ..Progress::default() };
     let second = CurveRow { samples: 8, ..row };
-    store.add_checkpoint(&job, NewCheckpoint { look: 1, row, progress }).await.unwrap();
-    store.add_checkpoint(&job, NewCheckpoint { look: 2, row: second, progress }).await.unwrap();
-    store.add_checkpoint(&job, NewCheckpoint { look: 1, row: second, progress }).await.unwrap();
+    let layer = LayerError { mean_luminance: 0.5, rms_error: Some(0.1), relative_error: None };
+    let checkpoint =
+        |look, row, layers: &[LayerError]| NewCheckpoint { look, row, layers: layers.to_vec(), progress };
+    assert_eq!(store.layers(&job).await.unwrap(), []);
+    store.add_checkpoint(&job, checkpoint(1, row, &[])).await.unwrap();
+    store.add_checkpoint(&job, checkpoint(2, second, &[layer, layer])).await.unwrap();
+    store.add_checkpoint(&job, checkpoint(1, second, &[layer])).await.unwrap();
+    assert_eq!(store.layers(&job).await.unwrap(), [layer, layer]);
     assert_eq!(store.curve(&job).await.unwrap(), [row, second]);
     assert_eq!(store.job(&job).await.unwrap().unwrap().progress, progress);
     let lane = Lane { replicate: 1, region: 0 };

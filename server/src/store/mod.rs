@@ -11,7 +11,7 @@ pub mod contract;
 
 use error::Result;
 use ovtigre_proto::{
-    curve::CurveRow,
+    curve::{CurveRow, LayerError},
     id::{BlobId, JobId, LeaseId, WorkerId},
     lease::WorkerJoin,
     scene::SceneReport,
@@ -66,6 +66,8 @@ pub trait Store: Send + Sync + fmt::Debug {
     async fn set_snapshot(&self, job: &JobId, lane: Lane, blocks: u32) -> Result<()>;
     /// Adds a checkpoint; again changes nothing.
     async fn add_checkpoint(&self, job: &JobId, checkpoint: NewCheckpoint) -> Result<()>;
+    /// The layers' errors at a job's latest checkpoint; nothing before the first.
+    async fn layers(&self, job: &JobId) -> Result<Vec<LayerError>>;
     /// A job's checkpoints in order.
     async fn curve(&self, job: &JobId) -> Result<Vec<CurveRow>>;
 

@@ -3,7 +3,7 @@
 use jiff::Timestamp;
 use ovtigre_core::film::batch::Batch;
 use ovtigre_proto::{
-    curve::CurveRow,
+    curve::{CurveRow, LayerError},
     id::{BlobId, JobId, LeaseId, WorkerId},
     lease::WorkerJoin,
     scene::SceneReport,
@@ -321,12 +321,14 @@ pub struct WorkerRow {
 }
 
 /// A checkpoint, and how far the picture is at it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct NewCheckpoint {
     /// Its number, from 1.
     pub look: u32,
     /// Its row of the curve.
     pub row: CurveRow,
+    /// The error of each layer.
+    pub layers: Vec<LayerError>,
     /// What is in the picture.
     pub progress: Progress,
 }

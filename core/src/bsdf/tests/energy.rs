@@ -4,7 +4,7 @@ use super::*;
 use crate::bsdf::event::{SampleKind, Transport};
 
 /// Σ f |cos| / p over a rank-1 lattice; flux, so without the factor of radiance in refraction.
-fn albedo(bsdf: &Bsdf, wo: Vec3, points: u32) -> Rgb {
+pub(super) fn albedo(bsdf: &Bsdf, wo: Vec3, points: u32) -> Rgb {
     // Irrational steps from the plastic number (Roberts's R₂), and equal ones.
     const STEP: [f64; 2] = [0.754_877_666_246_693, 0.569_840_290_998_053];
     let mut sum = glam::DVec3::ZERO;
@@ -105,7 +105,7 @@ fn both_sides(bsdf: &Bsdf, wo: Vec3) -> (f32, f32) {
     let mut shares = (0.0, 0.0);
     for u in [0.0, 1.0_f32.next_down()] {
         let sample = bsdf.sample(wo, u, Vec2::splat(0.3), Transport::Importance).unwrap();
-        let SampleKind::Specular { weight, probability } = sample.kind else { panic!("not specular") };
+        let SampleKind::Specular { weight, probability, .. } = sample.kind else { panic!("not specular") };
         if sample.wi.z * wo.z > 0.0 {
             shares.0 = weight.x * probability;
         } else {

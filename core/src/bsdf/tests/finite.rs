@@ -55,7 +55,7 @@ fn values_are_finite_and_not_negative() {
                 assert!(wo.z != 0.0 && sample.wi.is_finite());
                 let (weight, density) = match sample.kind {
                     SampleKind::Smooth { value, pdf } => (value.total(), pdf),
-                    SampleKind::Specular { weight, probability } => (weight, probability),
+                    SampleKind::Specular { weight, probability, .. } => (weight, probability),
                 };
                 assert!(density > 0.0 && density.is_finite(), "{density} {wo} {u:?} {surface:?}");
                 assert!(weight.is_finite() && weight.min_element() >= 0.0, "{weight} {wo} {u:?} {surface:?}");

@@ -6,6 +6,7 @@ mod chart;
 mod chi_square;
 mod energy;
 mod finite;
+mod kept;
 pub(in crate::bsdf) mod oracle;
 mod reciprocity;
 

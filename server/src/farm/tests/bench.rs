@@ -122,7 +122,7 @@ impl Bench {
 
     /// Brings a batch that took a millisecond a sample.
     pub(crate) async fn bring(&self, lease: &Lease, spread: Spread) -> Commit {
-        self.bring_sum(lease, &sum(lease.batch, spread)).await.unwrap()
+        self.bring_sum(lease, &layered(lease, spread)).await.unwrap()
     }
 
     pub(crate) async fn bring_sum(&self, lease: &Lease, sum: &Sum) -> crate::farm::error::Result<Commit> {
@@ -212,6 +212,17 @@ pub(crate) fn partial(lease: &Lease, sum: &Sum) -> Bytes {
         method: lease.settings.method.name().to_owned(),
     };
     write_partial(sum, lease.settings.size, &attributes).into()
+}
+
+/// The sum of a lease: each plane is half of the one before.
+pub(crate) fn layered(lease: &Lease, spread: Spread) -> Sum {
+    let mut sum = sum(lease.batch, spread);
+    for _ in 1..lease.settings.planes() {
+        let half = |pixel: &[f32; 3]| pixel.map(|value| 0.5 * value);
+        let next = sum.planes.last().expect("a picture").iter().map(half).collect();
+        sum.planes.push(next);
+    }
+    sum
 }
 
 /// A sum that follows from its batch alone.

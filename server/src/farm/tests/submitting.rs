@@ -47,11 +47,8 @@ async fn a_request_that_cannot_be_followed_is_refused_where_it_is_wrong() {
         ("/focus_distance", Box::new(|r| r.lens_radius = Some(0.1))),
         ("/lens_radius", Box::new(|r| r.lens_radius = Some(-0.1))),
         ("/size", Box::new(|r| r.size = Some("32768x32768".parse().unwrap()))),
-        ("/paths", Box::new(|r| r.paths = Some("LDE".to_owned()))),
-        ("/preset", Box::new(|r| r.preset = Some("whitted".to_owned()))),
-        ("/layers", Box::new(|r| r.layers = vec!["a=LDE".to_owned()])),
-        ("/method", Box::new(|r| r.method = Some(ovtigre_proto::job::MethodRequest::Photon))),
-        ("/shutter", Box::new(|r| r.shutter = Some([0.0, 0.5]))),
+        ("/shutter", Box::new(|r| r.shutter = Some([0.5, 0.0]))),
+        ("/shutter", Box::new(|r| r.shutter = Some([0.0, f64::INFINITY]))),
         ("/name", Box::new(|r| r.name = Some("x".repeat(1000)))),
     ];
     for (pointer, change) in cases {

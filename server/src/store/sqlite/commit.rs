@@ -6,7 +6,7 @@ use crate::store::{
     row::{BatchKey, CommitOutcome, CommitRow, NewCheckpoint, NewCommit},
 };
 use ovtigre_proto::{
-    curve::CurveRow,
+    curve::{CurveRow, LayerError},
     id::{BlobId, JobId},
 };
 use sqlx::{Row as _, SqliteConnection};
@@ -101,11 +101,12 @@ async fn compare(
 
 /// Adds a checkpoint; again changes nothing.
 pub(super) async fn add_checkpoint(db: &mut SqliteConnection, job: &JobId, new: NewCheckpoint) -> Result<()> {
-    let NewCheckpoint { look, row, progress } = new;
+    let NewCheckpoint { look, row, layers, progress } = new;
+    let layers = serde_json::to_string(&layers).map_err(|e| StoreError::damaged("layers", e))?;
     let added = sqlx::query(
         "INSERT INTO checkpoint (job, look, samples, wall_seconds, worker_seconds, rays,
-                                 rms_error, relative_error, relative_error_upper)
-         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT DO NOTHING",
+                                 rms_error, relative_error, relative_error_upper, layers)
+         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT DO NOTHING",
     )
     .bind(job.as_str())
     .bind(look)
@@ -116,6 +117,7 @@ pub(super) async fn add_checkpoint(db: &mut SqliteConnection, job: &JobId, new: 
     .bind(row.rms_error)
     .bind(row.relative_error)
     .bind(row.relative_error_upper)
+    .bind(layers)
     .execute(&mut *db)
     .await?;
     if added.rows_affected() > 0 {
@@ -127,6 +129,17 @@ pub(super) async fn add_checkpoint(db: &mut SqliteConnection, job: &JobId, new: 
             .await?;
     }
     Ok(())
+}
+
+/// What was known of a job's layers at its latest checkpoint.
+pub(super) async fn layers(db: &mut SqliteConnection, job: &JobId) -> Result<Vec<LayerError>> {
+    let text: Option<String> =
+        sqlx::query_scalar("SELECT layers FROM checkpoint WHERE job = ? ORDER BY look DESC LIMIT 1")
+            .bind(job.as_str())
+            .fetch_optional(db)
+            .await?;
+    let Some(text) = text else { return Ok(Vec::new()) };
+    serde_json::from_str(&text).map_err(|e| StoreError::damaged("layers", e))
 }
 
 /// A job's checkpoints in order.

@@ -16,7 +16,7 @@ use super::{
     },
 };
 use ovtigre_proto::{
-    curve::CurveRow,
+    curve::{CurveRow, LayerError},
     id::{BlobId, JobId, LeaseId, WorkerId},
     lease::WorkerJoin,
     scene::SceneReport,
@@ -156,6 +156,10 @@ impl Store for Sqlite {
         self.writer
             .write(move |db| Box::pin(async move { commit::add_checkpoint(db, &job, checkpoint).await }))
             .await
+    }
+
+    async fn layers(&self, job: &JobId) -> Result<Vec<LayerError>> {
+        commit::layers(&mut *self.reader().await?, job).await
     }
 
     async fn curve(&self, job: &JobId) -> Result<Vec<CurveRow>> {

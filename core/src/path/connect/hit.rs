@@ -1,0 +1,128 @@
+//! Light that an eye subpath hits: no vertex of the path is from the light.
+
+use crate::math::colour::Rgb;
+use crate::path::connect::light_vertex::LightStart;
+use crate::path::connect::whole::{Joint, whole};
+use crate::path::expression::language::{EyeState, LightState};
+use crate::path::mis::exhaustive::Link;
+use crate::path::mis::recursive;
+use crate::path::rules::Weighing;
+use crate::path::tally::{Receiver, Tally};
+use crate::path::throughput::Throughput;
+use crate::path::vertex::Density;
+use crate::path::walk::{EdgeKind, Walk};
+use crate::scene::emission::EmissionDensity;
+use crate::scene::interaction::Interaction;
+use crate::settings::Shadows;
+use glam::Vec3;
+
+/// Light that was hit.
+struct Hit {
+    light: u32,
+    radiance: Rgb,
+    /// Density of a next event from the vertex before, in the measure of the eye's density.
+    next_event: f64,
+    emission: EmissionDensity,
+    /// Turns a density over solid angle at the light into one over area at the vertex before; for light from infinitely
+    /// far, one over its disk.
+    jacobian: f64,
+}
+
+/// Light of the environment where the ray leaves the scene.
+pub fn hit_environment<S: Throughput<EyeState>, L: Throughput<LightState>>(
+    walk: &Walk<'_, EyeState, S>,
+    tally: &mut Tally,
+) {
+    let (scene, direction) = (walk.scene, walk.edge.ray.direction);
+    let Some(environment) = &scene.environment else { return };
+    let Some(light) = scene.lights.of_environment() else { return };
+    let radiance = environment.radiance(direction);
+    if radiance == Vec3::ZERO {
+        return;
+    }
+    let emission = scene.lights.emission_density(&scene.data, Some(environment), light, direction, 1.0);
+    // Parallel rays all meet the same point of the sky: no other technique does.
+    let next_event = match walk.edge.kind {
+        EdgeKind::Directions => f64::from(emission.origin),
+        EdgeKind::Parallel => 0.0,
+    };
+    deposit::<S, L>(walk, &Hit { light, radiance, next_event, emission, jacobian: walk.edge.cos }, tally);
+}
+
+/// Light that the surface that was hit emits along the ray.
+pub fn hit_surface<S: Throughput<EyeState>, L: Throughput<LightState>>(
+    walk: &Walk<'_, EyeState, S>,
+    at: &Interaction<'_>,
+    triangle: (u32, u32),
+    tally: &mut Tally,
+) {
+    if !at.material.emits() {
+        return;
+    }
+    let (scene, direction) = (walk.scene, walk.edge.ray.direction);
+    let radiance = at.emission(at.side(-direction));
+    let Some(light) = scene.lights.of_triangle(triangle) else { return };
+    if radiance == Vec3::ZERO {
+        return;
+    }
+    let cos = direction.dot(at.ng).abs();
+    let squared = walk.squared(at.position);
+    let emission = scene.lights.emission_density(&scene.data, None, light, direction, cos);
+    let next_event = if walk.scatterings == 0 {
+        f64::from(emission.origin)
+    } else {
+        let pdf = scene.lights.triangle_pdf(&scene.data, triangle, walk.edge.from, at, direction);
+        f64::from(pdf) * f64::from(cos) / squared
+    };
+    let jacobian = walk.edge.cos / squared;
+    deposit::<S, L>(walk, &Hit { light, radiance, next_event, emission, jacobian }, tally);
+}
+
+fn deposit<S: Throughput<EyeState>, L: Throughput<LightState>>(
+    walk: &Walk<'_, EyeState, S>,
+    hit: &Hit,
+    tally: &mut Tally,
+) {
+    let technique = (0, walk.scatterings as usize + 2);
+    let rules = walk.rules;
+    let Some(start) = rules.language.light_start(rules.tag(hit.light)) else { return };
+    if !rules.uses(technique) {
+        return;
+    }
+    let weight = weight(walk, hit);
+    let light = L::in_state(start, hit.radiance);
+    tally.deposit(rules, Receiver::Own, technique, &walk.carried, &light, Rgb::splat(weight as f32));
+}
+
+fn weight<S: Throughput<EyeState>>(walk: &Walk<'_, EyeState, S>, hit: &Hit) -> f64 {
+    match &walk.rules.weighing {
+        // Next events that nothing blocks have found all of it.
+        Weighing::FromEye if walk.rules.shadows == Shadows::Off && walk.edge.density != Density::Delta => {
+            if walk.scatterings == 0 {
+                1.0
+            } else {
+                0.0
+            }
+        }
+        Weighing::FromEye => 1.0 / (1.0 + hit.next_event * walk.partial.near),
+        Weighing::ToLens => 0.0,
+        Weighing::All(h) => {
+            let emitted = f64::from(hit.emission.origin) * f64::from(hit.emission.emission);
+            recursive::hit(*h, &walk.partial, hit.next_event, emitted)
+        }
+        Weighing::Chosen(chosen) => {
+            let joint = Joint {
+                eye_end: f64::from(hit.emission.origin),
+                before_eye_end: f64::from(hit.emission.emission) * hit.jacobian,
+                ..Joint::default()
+            };
+            let mut links = walk.links.clone();
+            if links.len() < walk.scatterings as usize + 2 {
+                let forward = walk.edge.density.over_solid_angle();
+                links.push(Link { forward, reverse: 0.0, jacobian: hit.jacobian, specular: false });
+            }
+            let start = LightStart { next_event: hit.next_event, is_hit: true };
+            chosen.weight(&whole(&[], &links, joint), &walk.ends(start), 0)
+        }
+    }
+}

@@ -1,0 +1,181 @@
+//! A light subpath joined to the lens: at most one vertex of the path is from the eye.
+
+use crate::bsdf::event::Transport;
+use crate::math::colour::Rgb;
+use crate::path::connect::light_vertex::LightStart;
+use crate::path::connect::unblocked;
+use crate::path::connect::whole::{Joint, whole};
+use crate::path::expression::language::{EyeState, LightState};
+use crate::path::mis::exhaustive::{Ends, Link};
+use crate::path::mis::recursive;
+use crate::path::rules::{Rules, Weighing};
+use crate::path::tally::{Receiver, Tally};
+use crate::path::throughput::Throughput;
+use crate::path::vertex::{Vertex, Weight};
+use crate::path::walk::Walk;
+use crate::sampler::Use;
+use crate::scene::importance::{Importance, LensHit, Seen};
+use glam::Vec3;
+
+/// Adds light that goes from `vertex` to the lens.
+pub fn to_lens<E: Throughput<EyeState>, L: Throughput<LightState>>(
+    walk: &Walk<'_, LightState, L>,
+    vertex: &Vertex<'_>,
+    start: LightStart,
+    tally: &mut Tally,
+) {
+    let technique = (walk.scatterings as usize + 2, 1);
+    let (scene, rules) = (walk.scene, walk.rules);
+    if !rules.uses(technique) {
+        return;
+    }
+    let lens = walk.sampler.pair(walk.dimension(Use::Lens));
+    let Some(seen) = scene.view.see(vertex.at.position, lens) else { return };
+    let (value, backward) = vertex.evaluate(seen.direction, Transport::Importance);
+    let light = walk.carried.scattered(&rules.language, Weight::Smooth(value));
+    if light.is_dead() || light.total() == Vec3::ZERO {
+        return;
+    }
+    let passes = unblocked::between(scene, vertex, &walk.media, seen.end, tally);
+    if passes == Vec3::ZERO {
+        return;
+    }
+    let squared = f64::from((seen.end - vertex.at.position).length_squared());
+    // The cosine at the vertex is in `value`.
+    let importance = seen.pdf.over_area(squared, 1.0);
+    let end = LensEnd::new(walk, vertex, &seen, squared, backward);
+    let weight = weight(walk, &end, start, f64::from(vertex.reverse_pdf(seen.direction)));
+    let factor = passes * (weight * importance / rules.light_paths) as f32;
+    let eye = E::in_state(rules.language.eye_start(), Vec3::ONE);
+    tally.deposit(rules, Receiver::Pixel(seen.pixel), technique, &eye, &light, factor);
+}
+
+/// Densities of an edge to the lens.
+struct LensEnd {
+    /// With which a pixel's ray meets the vertex, over area.
+    from_eye: f64,
+    /// With which light from the vertex meets the lens, over area.
+    from_light: f64,
+}
+
+impl LensEnd {
+    fn new<L: Throughput<LightState>>(
+        walk: &Walk<'_, LightState, L>,
+        vertex: &Vertex<'_>,
+        seen: &Seen,
+        squared: f64,
+        pdf: f32,
+    ) -> Self {
+        let cos = f64::from(walk.scene.view.axis().dot(seen.direction).abs());
+        Self {
+            from_eye: seen.pdf.over_area(squared, f64::from(vertex.cos(seen.direction))),
+            from_light: f64::from(pdf) * cos / squared,
+        }
+    }
+}
+
+fn weight<L: Throughput<LightState>>(
+    walk: &Walk<'_, LightState, L>,
+    end: &LensEnd,
+    start: LightStart,
+    reverse: f64,
+) -> f64 {
+    match &walk.rules.weighing {
+        Weighing::FromEye => 0.0,
+        Weighing::ToLens => 1.0,
+        Weighing::All(h) => {
+            recursive::to_lens(*h, &walk.partial, end.from_eye / walk.rules.light_paths, reverse)
+        }
+        Weighing::Chosen(chosen) => {
+            let lens = Link { forward: 1.0, reverse: 0.0, jacobian: 0.0, specular: false };
+            let joint = Joint {
+                eye_end: end.from_light,
+                before_eye_end: 0.0,
+                light_end: end.from_eye,
+                before_light_end: reverse * walk.links.last().map_or(0.0, |link| link.jacobian),
+            };
+            chosen.weight(&whole(&walk.links, &[lens], joint), &walk.ends(start), walk.links.len())
+        }
+    }
+}
+
+/// A place that light starts from, seen by the lens itself.
+#[derive(Clone, Copy, Debug)]
+pub struct Shown {
+    /// How.
+    pub seen: Seen,
+    /// Radiance towards the lens over the density of the place.
+    pub radiance: Rgb,
+    /// Density of the place: over area, or over solid angle from infinitely far.
+    pub place: f64,
+    /// Squared distance and cosine there; ones from infinitely far.
+    pub squared: f64,
+    /// See `squared`.
+    pub cos: f64,
+    /// What passes.
+    pub passes: f32,
+    /// Where light starts.
+    pub state: LightState,
+}
+
+/// Adds light that goes from its light to the lens.
+pub fn light_to_lens<E: Throughput<EyeState>, L: Throughput<LightState>>(
+    rules: &Rules,
+    shown: &Shown,
+    tally: &mut Tally,
+) {
+    let technique = (1, 1);
+    let from_eye = shown.seen.pdf.over_area(shown.squared, shown.cos);
+    let weight = match &rules.weighing {
+        Weighing::FromEye => 0.0,
+        Weighing::ToLens => 1.0,
+        Weighing::All(h) => recursive::light_to_lens(*h, from_eye / (rules.light_paths * shown.place)),
+        Weighing::Chosen(chosen) => {
+            let light = Link { forward: shown.place, reverse: 0.0, jacobian: 0.0, specular: false };
+            let lens = Link { forward: 1.0, ..light };
+            let joint = Joint { light_end: from_eye, ..Joint::default() };
+            let ends = Ends {
+                next_event: shown.place,
+                light_is_hit: true,
+                lens: None,
+                light_paths: rules.light_paths,
+            };
+            chosen.weight(&whole(&[light], &[lens], joint), &ends, 1)
+        }
+    };
+    let factor = weight * from_eye / rules.light_paths * f64::from(shown.passes);
+    let eye = E::in_state(rules.language.eye_start(), Vec3::ONE);
+    let light = L::in_state(shown.state, shown.radiance);
+    let receiver = Receiver::Pixel(shown.seen.pixel);
+    tally.deposit(rules, receiver, technique, &eye, &light, Rgb::splat(factor as f32));
+}
+
+/// Adds light that meets the lens on its way to `end`.
+pub fn hit_lens<E: Throughput<EyeState>, L: Throughput<LightState>>(
+    walk: &Walk<'_, LightState, L>,
+    t_max: f32,
+    start: LightStart,
+    tally: &mut Tally,
+) {
+    let technique = (walk.scatterings as usize + 2, 0);
+    let rules = walk.rules;
+    let Weighing::Chosen(chosen) = &rules.weighing else { return };
+    if !chosen.uses(technique.0, technique.1) {
+        return;
+    }
+    let Some(hit) = walk.scene.view.meet(&walk.edge.ray, t_max) else { return };
+    let LensHit { pixel, t, position, cos, place_pdf, direction_pdf } = hit;
+    let squared = walk.squared(position);
+    let forward = walk.edge.density.over_solid_angle() * cos / squared;
+    let jacobian = walk.edge.cos / squared;
+    let mut links = walk.links.clone();
+    links.push(Link { forward, reverse: 0.0, jacobian, specular: false });
+    // From the eye: the lens' place is left out, and the pixel's ray reaches the vertex before.
+    let before_light_end = Importance::SolidAngle(direction_pdf).over_area(1.0, 1.0) * jacobian;
+    let joint = Joint { light_end: 1.0, before_light_end, ..Joint::default() };
+    let weight = chosen.weight(&whole(&links, &[], joint), &walk.ends(start), technique.0);
+    let importance = place_pdf * direction_pdf / (cos * rules.light_paths);
+    let factor = walk.media.transmittance(t) * (weight * importance) as f32;
+    let eye = E::in_state(rules.language.eye_start(), Vec3::ONE);
+    tally.deposit(rules, Receiver::Pixel(pixel), technique, &eye, &walk.carried, factor);
+}

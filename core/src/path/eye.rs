@@ -1,0 +1,112 @@
+//! The walk from the eye.
+
+use crate::bsdf::event::Transport;
+use crate::path::connect::hit::{hit_environment, hit_surface};
+use crate::path::connect::join::join;
+use crate::path::connect::light_vertex::LightVertex;
+use crate::path::connect::next_event::next_event;
+use crate::path::expression::language::EyeState;
+use crate::path::mis::exhaustive::Link;
+use crate::path::mis::partial::Partial;
+use crate::path::rules::{Rules, Weighing};
+use crate::path::tally::Tally;
+use crate::path::throughput::{Carriage, Throughput};
+use crate::path::vertex::{Density, Vertex};
+use crate::path::walk::{Edge, EdgeKind, Visitor, Walk};
+use crate::sampler::Sampler;
+use crate::scene::Scene;
+use crate::scene::importance::Importance;
+use crate::scene::interaction::Interaction;
+use crate::trace::ray::Ray;
+use core::marker::PhantomData;
+use glam::Vec3;
+
+/// A walk from the eye that hits lights and makes next events.
+#[derive(Debug)]
+pub struct FromEye<C>(pub PhantomData<C>);
+
+/// A walk from the eye that is also joined to all vertices of a light subpath.
+#[derive(Debug)]
+pub struct Joined<'v, 'a, C: Carriage> {
+    /// Vertices of the light subpath.
+    pub light: &'v [LightVertex<'a, C::Light>],
+}
+
+impl<'a, C: Carriage> Visitor<'a, EyeState, C::Eye> for FromEye<C> {
+    const TWO_WAY: bool = false;
+
+    fn escapes(&mut self, walk: &Walk<'a, EyeState, C::Eye>, tally: &mut Tally) {
+        hit_environment::<C::Eye, C::Light>(walk, tally);
+    }
+
+    fn arrives(
+        &mut self,
+        walk: &mut Walk<'a, EyeState, C::Eye>,
+        at: &Interaction<'a>,
+        triangle: (u32, u32),
+        tally: &mut Tally,
+    ) {
+        hit_surface::<C::Eye, C::Light>(walk, at, triangle, tally);
+    }
+
+    fn scatters(&mut self, walk: &Walk<'a, EyeState, C::Eye>, vertex: &Vertex<'a>, tally: &mut Tally) {
+        if vertex.is_smooth() {
+            next_event::<C::Eye, C::Light>(walk, vertex, tally);
+        }
+    }
+}
+
+impl<'a, C: Carriage> Visitor<'a, EyeState, C::Eye> for Joined<'_, 'a, C> {
+    const TWO_WAY: bool = true;
+
+    fn escapes(&mut self, walk: &Walk<'a, EyeState, C::Eye>, tally: &mut Tally) {
+        hit_environment::<C::Eye, C::Light>(walk, tally);
+    }
+
+    fn arrives(
+        &mut self,
+        walk: &mut Walk<'a, EyeState, C::Eye>,
+        at: &Interaction<'a>,
+        triangle: (u32, u32),
+        tally: &mut Tally,
+    ) {
+        hit_surface::<C::Eye, C::Light>(walk, at, triangle, tally);
+    }
+
+    fn scatters(&mut self, walk: &Walk<'a, EyeState, C::Eye>, vertex: &Vertex<'a>, tally: &mut Tally) {
+        if vertex.is_smooth() {
+            next_event::<C::Eye, C::Light>(walk, vertex, tally);
+            for light in self.light {
+                join(walk, vertex, light, tally);
+            }
+        }
+    }
+}
+
+/// The walk along a camera ray.
+pub fn from_eye<'a, C: Carriage>(
+    scene: &'a Scene,
+    rules: &'a Rules,
+    sampler: &'a Sampler,
+    ray: Ray,
+) -> Walk<'a, EyeState, C::Eye> {
+    let (pdf, kind) = match scene.view.ray_pdf(ray.direction) {
+        Importance::SolidAngle(pdf) => (pdf, EdgeKind::Directions),
+        Importance::Area(pdf) => (pdf, EdgeKind::Parallel),
+    };
+    // Light subpaths that are joined to the lens reach every pixel.
+    let near = match rules.weighing {
+        Weighing::All(h) => h.of(rules.light_paths / pdf),
+        _ => 0.0,
+    };
+    let carried = C::Eye::in_state(rules.language.eye_start(), Vec3::ONE);
+    let cos = f64::from(scene.view.axis().dot(ray.direction).abs());
+    let density = Density::SolidAngle(pdf as f32);
+    let edge = Edge { ray, from: ray.origin, cos, density, kind };
+    let partial = Partial { near, far: 0.0 };
+    let mut walk = Walk::new((scene, rules, sampler), Transport::Radiance, edge, carried, partial);
+    if walk.keeps_links() {
+        walk.links.push(Link { forward: 1.0, reverse: 0.0, jacobian: 0.0, specular: false });
+    }
+    walk
+}

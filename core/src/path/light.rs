@@ -1,0 +1,177 @@
+//! The walk from a light.
+
+use crate::bsdf::event::Transport;
+use crate::math::colour::Rgb;
+use crate::path::connect::lens::{Shown, hit_lens, light_to_lens, to_lens};
+use crate::path::connect::light_vertex::{LightStart, LightVertex};
+use crate::path::connect::unblocked;
+use crate::path::expression::language::LightState;
+use crate::path::mis::exhaustive::Link;
+use crate::path::mis::partial::Partial;
+use crate::path::rules::Rules;
+use crate::path::tally::Tally;
+use crate::path::throughput::{Carriage, Throughput};
+use crate::path::vertex::{Density, Vertex};
+use crate::path::walk::{Edge, EdgeKind, Visitor, Walk};
+use crate::sampler::{Dimension, Sampler, StartUse};
+use crate::scene::Scene;
+use crate::scene::emission::{Origin, Place};
+use crate::scene::interaction::Interaction;
+use crate::trace::ray::Ray;
+use glam::{Vec2, Vec3};
+
+/// What a walk from a light leaves behind.
+#[derive(Debug)]
+pub struct FromLight<'a, C: Carriage> {
+    /// Vertices that eye subpaths can be joined to, where they are kept.
+    pub vertices: Vec<LightVertex<'a, C::Light>>,
+    keeps: Keeps,
+    start: LightStart,
+    origin: Origin<'a>,
+}
+
+/// Whether vertices are kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Keeps {
+    /// For joins.
+    Vertices,
+    /// The lens is all there is to join to.
+    Nothing,
+}
+
+impl<'a, C: Carriage> Visitor<'a, LightState, C::Light> for FromLight<'a, C> {
+    const TWO_WAY: bool = true;
+
+    fn escapes(&mut self, walk: &Walk<'a, LightState, C::Light>, tally: &mut Tally) {
+        hit_lens::<C::Eye, C::Light>(walk, f32::INFINITY, self.start, tally);
+    }
+
+    fn arrives(
+        &mut self,
+        walk: &mut Walk<'a, LightState, C::Light>,
+        at: &Interaction<'a>,
+        _: (u32, u32),
+        tally: &mut Tally,
+    ) {
+        if walk.scatterings == 0 {
+            self.learn(walk, at);
+        }
+        hit_lens::<C::Eye, C::Light>(walk, (at.position - walk.edge.ray.origin).length(), self.start, tally);
+    }
+
+    fn scatters(&mut self, walk: &Walk<'a, LightState, C::Light>, vertex: &Vertex<'a>, tally: &mut Tally) {
+        if !vertex.is_smooth() {
+            return;
+        }
+        to_lens::<C::Eye, C::Light>(walk, vertex, self.start, tally);
+        if self.keeps == Keeps::Vertices {
+            self.vertices.push(LightVertex {
+                vertex: vertex.clone(),
+                carried: walk.carried.clone(),
+                partial: walk.partial,
+                media: walk.media,
+                vertices: walk.scatterings as usize + 2,
+                links: walk.links.clone(),
+                start: self.start,
+            });
+        }
+    }
+}
+
+impl<'a, C: Carriage> FromLight<'a, C> {
+    /// At the second vertex: how next events there would have found the first. The place on a surface is sampled
+    /// differently by the two, so that 1 / p→ of the first edge alone is not yet what is behind.
+    fn learn(&mut self, walk: &mut Walk<'a, LightState, C::Light>, at: &Interaction<'a>) {
+        let Place::Surface(from) = &self.origin.place else { return };
+        let data = &walk.scene.data;
+        let towards = -walk.edge.ray.direction;
+        let pdf = walk.scene.lights.light_pdf(data, self.origin.light, at.position, from, towards);
+        let squared = walk.squared(at.position);
+        self.start.next_event = f64::from(pdf) * walk.edge.cos / squared;
+        let h = walk.rules.heuristic();
+        walk.partial.near *= h.of(self.start.next_event / f64::from(self.origin.pdf));
+    }
+}
+
+/// Samples a light subpath, joins it to the lens, and returns its vertices.
+pub fn from_light<'a, C: Carriage>(
+    scene: &'a Scene,
+    rules: &'a Rules,
+    sampler: &'a Sampler,
+    keeps: Keeps,
+    tally: &mut Tally,
+) -> Vec<LightVertex<'a, C::Light>> {
+    let pair = |what| sampler.pair(Dimension::Start(what));
+    let choice = pair(StartUse::Choice);
+    let environment = scene.environment.as_ref();
+    let origin = scene.lights.origin(&scene.data, environment, choice.x, pair(StartUse::Place));
+    let Some(origin) = origin else { return Vec::new() };
+    let Some(state) = rules.language.light_start(rules.tag(origin.light)) else { return Vec::new() };
+    if rules.uses((1, 1)) {
+        show::<C>(scene, rules, &origin, state, pair(StartUse::Lens), tally);
+    }
+    let Some(emission) = origin.place.emit(&scene.data, choice.y, pair(StartUse::Direction)) else {
+        return Vec::new();
+    };
+    let is_hit = matches!(origin.place, Place::Surface(_) | Place::Sky(..));
+    let kind = if origin.place.is_distant() { EdgeKind::Parallel } else { EdgeKind::Directions };
+    let (place, direction) = (f64::from(origin.pdf), f64::from(emission.pdf));
+    let h = rules.heuristic();
+    let cos = f64::from(emission.cos);
+    let near = h.of(1.0 / direction);
+    let far = if is_hit { h.of(cos / (place * direction)) } else { 0.0 };
+    let throughput = emission.radiance * (cos / (place * direction)) as f32;
+    let carried = C::Light::in_state(state, throughput);
+    let from = match &origin.place {
+        Place::Surface(at) => at.position,
+        _ => emission.ray.origin,
+    };
+    let density = Density::SolidAngle(emission.pdf);
+    let edge = Edge { ray: emission.ray, from, cos, density, kind };
+    let partial = Partial { near, far };
+    let mut walk = Walk::new((scene, rules, sampler), Transport::Importance, edge, carried, partial);
+    if walk.keeps_links() {
+        walk.links.push(Link { forward: place, reverse: 0.0, jacobian: 0.0, specular: false });
+    }
+    let start = LightStart { next_event: place, is_hit };
+    let mut visitor = FromLight::<C> { vertices: Vec::new(), keeps, start, origin };
+    walk.run(&mut visitor, tally);
+    visitor.vertices
+}
+
+/// Joins the place that light starts from to the lens itself.
+fn show<C: Carriage>(
+    scene: &Scene,
+    rules: &Rules,
+    origin: &Origin<'_>,
+    state: LightState,
+    lens: Vec2,
+    tally: &mut Tally,
+) {
+    let view = &scene.view;
+    let (seen, radiance, ray, squared, cos) = match &origin.place {
+        Place::Surface(at) => {
+            let Some(seen) = view.see(at.position, lens) else { return };
+            let radiance = at.emission(at.side(seen.direction)) * at.alpha();
+            let start = at.leave(seen.direction);
+            let ray = Ray { origin: start, direction: seen.end - start, t_max: 1.0 };
+            let squared = f64::from((seen.end - at.position).length_squared());
+            (seen, radiance, ray, squared, f64::from(seen.direction.dot(at.ng).abs()))
+        }
+        Place::Sky(towards, radiance) => {
+            let Some(seen) = view.see_far(*towards, lens) else { return };
+            (seen, *radiance, Ray::new(seen.end, *towards), 1.0, 1.0)
+        }
+        Place::Point(..) | Place::Sun(..) => return,
+    };
+    if radiance == Vec3::ZERO {
+        return;
+    }
+    let passes = unblocked::along(scene, &ray, tally);
+    if passes > 0.0 {
+        let place = f64::from(origin.pdf);
+        let radiance: Rgb = radiance / origin.pdf;
+        let shown = Shown { seen, radiance, place, squared, cos, passes, state };
+        light_to_lens::<C::Eye, C::Light>(rules, &shown, tally);
+    }
+}

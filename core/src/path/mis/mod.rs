@@ -1,0 +1,9 @@
+//! Weights of the techniques that can make one path: a partition of unity.
+
+pub mod exhaustive;
+pub mod heuristic;
+pub mod partial;
+pub mod recursive;
+
+#[cfg(test)]
+mod tests;

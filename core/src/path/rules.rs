@@ -1,0 +1,177 @@
+//! What a walk has to know of the settings.
+
+use crate::bsdf::event::Letters;
+use crate::path::expression::error::ExpressionError;
+use crate::path::expression::language::{Language, LightTag};
+use crate::path::mis::exhaustive::Chosen;
+use crate::path::mis::heuristic::Heuristic;
+use crate::path::tally::Technique;
+use crate::scene::Scene;
+use crate::scene::light::Light;
+use crate::settings::{Gloss, Method, Settings, Shadows, Shows, Strategy, Weights};
+
+/// Most light subpaths of a pass of photons.
+const PHOTON_PATHS_MAX: usize = 1 << 18;
+/// Name of the environment in path expressions.
+const ENVIRONMENT: &str = "environment";
+
+/// What a walk has to know of the settings.
+#[derive(Clone, Debug)]
+pub struct Rules {
+    /// Which words count, for which picture.
+    pub language: Language,
+    /// Letters of words that count; surfaces scatter by no other.
+    pub letters: Letters,
+    /// How gloss is taken.
+    pub gloss: Gloss,
+    /// Most scatterings of a path.
+    pub bounces: u32,
+    /// Whether direct light is blocked.
+    pub shadows: Shadows,
+    /// How techniques share a path.
+    pub weighing: Weighing,
+    /// Light subpaths for every eye subpath of a pixel.
+    pub light_paths: f64,
+    /// Names of the lights, by number.
+    tags: Vec<LightTag>,
+    /// The plane of each rule.
+    rule_planes: Vec<usize>,
+    /// The plane of each technique that has one.
+    technique_planes: Vec<(Technique, usize)>,
+    narrow_plane: Option<usize>,
+}
+
+/// How techniques share a path.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Weighing {
+    /// Light that is hit, and next events.
+    FromEye,
+    /// Only joins to the lens.
+    ToLens,
+    /// Everything but light that hits the lens.
+    All(Heuristic),
+    /// Chosen techniques.
+    Chosen(Chosen),
+}
+
+impl Rules {
+    /// From the settings of a picture of `pixels` pixels.
+    pub fn new(scene: &Scene, settings: &Settings, pixels: usize) -> Result<Self, ExpressionError> {
+        let mut expressions = vec![settings.paths.as_str()];
+        let (mut rule_planes, mut technique_planes, mut narrow_plane) = (vec![0], Vec::new(), None);
+        for (i, layer) in settings.layers.iter().enumerate() {
+            match &layer.shows {
+                Shows::Paths(paths) => {
+                    expressions.push(paths);
+                    rule_planes.push(i + 1);
+                }
+                Shows::Strategy(Strategy { s, t }) => {
+                    technique_planes.push(((*s as usize, *t as usize), i + 1));
+                }
+                Shows::Narrow => narrow_plane = Some(i + 1),
+            }
+        }
+        let language = Language::compile(&expressions)?;
+        let tags = tags(scene, &language);
+        Ok(Self {
+            letters: language.letters(),
+            language,
+            gloss: settings.gloss,
+            bounces: settings.bounces.unwrap_or(u32::MAX),
+            shadows: settings.shadows,
+            weighing: weighing(settings),
+            light_paths: light_paths(settings.method, pixels) as f64,
+            tags,
+            rule_planes,
+            technique_planes,
+            narrow_plane,
+        })
+    }
+
+    /// Number of pictures.
+    pub fn planes(&self) -> usize {
+        self.rule_planes.len() + self.technique_planes.len() + usize::from(self.narrow_plane.is_some())
+    }
+
+    /// The plane that shows the picture with half the area of gathering.
+    pub fn narrow_plane(&self) -> Option<usize> {
+        self.narrow_plane
+    }
+
+    /// Whether every path counts, for one picture.
+    pub fn is_everything(&self) -> bool {
+        self.planes() == 1 && self.language.is_everything()
+    }
+
+    /// The plane of a rule.
+    pub fn rule_plane(&self, rule: usize) -> usize {
+        self.rule_planes[rule]
+    }
+
+    /// The plane of a technique, where it has one.
+    pub fn technique_plane(&self, technique: Technique) -> Option<usize> {
+        self.technique_planes.iter().find(|(one, _)| *one == technique).map(|(_, plane)| *plane)
+    }
+
+    /// The name of a light.
+    pub fn tag(&self, light: u32) -> LightTag {
+        self.tags[light as usize]
+    }
+
+    /// Whether a technique is used.
+    pub fn uses(&self, (s, t): Technique) -> bool {
+        match &self.weighing {
+            Weighing::FromEye => s <= 1 && t >= 2,
+            Weighing::ToLens => t == 1,
+            Weighing::All(_) => t >= 1,
+            Weighing::Chosen(chosen) => chosen.uses(s, t),
+        }
+    }
+
+    /// How the recursion of weights counts ratios.
+    pub fn heuristic(&self) -> Heuristic {
+        match self.weighing {
+            Weighing::All(heuristic) => heuristic,
+            _ => Heuristic::Balance,
+        }
+    }
+}
+
+/// Light subpaths for every eye subpath of a pixel: as many as a picture has pixels, but photons have to be kept.
+fn light_paths(method: Method, pixels: usize) -> usize {
+    match method {
+        Method::Photon => pixels.min(PHOTON_PATHS_MAX),
+        _ => pixels,
+    }
+}
+
+fn weighing(settings: &Settings) -> Weighing {
+    match (settings.method, settings.weights) {
+        (Method::Light, _) => Weighing::ToLens,
+        (Method::Bidirectional, Weights::Balance) if settings.strategies.is_empty() => {
+            Weighing::All(Heuristic::Balance)
+        }
+        (Method::Bidirectional, Weights::Power) if settings.strategies.is_empty() => {
+            Weighing::All(Heuristic::Power)
+        }
+        (Method::Bidirectional, weights) => {
+            Weighing::Chosen(Chosen::new(settings.strategies.clone(), weights))
+        }
+        _ => Weighing::FromEye,
+    }
+}
+
+/// The names of each light: those of its node and its material.
+fn tags(scene: &Scene, language: &Language) -> Vec<LightTag> {
+    let data = &scene.data;
+    (0..scene.lights.len() as u32)
+        .map(|light| match *scene.lights.light(light) {
+            Light::Triangle { instance, triangle } => {
+                let names = [data.node_name(instance, triangle), &data.material(instance, triangle).name];
+                language.tag_of(&names)
+            }
+            Light::Punctual(index) => language.tag_of(&[&data.punctual[index as usize].name]),
+            Light::Environment => language.tag_of(&[ENVIRONMENT]),
+        })
+        .collect()
+}

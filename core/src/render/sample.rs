@@ -1,0 +1,71 @@
+//! One sample by the settings' method.
+
+use crate::film::batch::Batch;
+use crate::method::radiosity::Reconstruction;
+use crate::method::{bidirectional, camera::camera_ray, light, path, radiosity};
+use crate::path::rules::Rules;
+use crate::path::tally::Tally;
+use crate::path::throughput::Carriage;
+use crate::radiosity::solution::Solution;
+use crate::sampler::Sampler;
+use crate::scene::Scene;
+use crate::settings::{Method, Settings};
+use crate::trace::ray::Ray;
+
+/// All that a sample depends on beside its pixel and index.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sampling<'a> {
+    pub(super) scene: &'a Scene,
+    /// Where the method is radiosity.
+    pub(super) radiosity: Option<&'a Solution>,
+    pub(super) settings: &'a Settings,
+    pub(super) rules: &'a Rules,
+    pub(super) batch: Batch,
+}
+
+impl Sampling<'_> {
+    /// Adds the sample of a pixel with an index to `tally`.
+    pub(super) fn sample<C: Carriage>(&self, pixel: [u32; 2], index: u32, tally: &mut Tally) {
+        let Self { scene, settings, rules, .. } = *self;
+        match settings.method {
+            Method::Path => {
+                let (eye, ray) = self.eye(pixel, index);
+                path::sample::<C>(scene, rules, ray, &eye, tally);
+            }
+            Method::Light => light::sample::<C>(scene, rules, &self.light(pixel, index), tally),
+            Method::Bidirectional => {
+                let (eye, ray) = self.eye(pixel, index);
+                let light = self.light(pixel, index);
+                bidirectional::sample::<C>(scene, rules, ray, [&eye, &light], tally);
+            }
+            Method::Radiosity => {
+                let solution = self.radiosity.expect("prepared for this method");
+                let eye = Sampler::new(settings.seed, self.batch.replicate, pixel, index);
+                let how = Reconstruction::Gather;
+                tally.planes[0] +=
+                    radiosity::sample(scene, solution, settings, how, pixel, &eye, &mut tally.rays);
+            }
+            other => unreachable!("{} is refused when a job is submitted", other.name()),
+        }
+    }
+
+    /// The numbers of the light subpath that goes with a pixel's sample.
+    fn light(&self, [x, y]: [u32; 2], index: u32) -> Sampler {
+        let region = self.batch.region;
+        let place = u64::from(y - region.y) * u64::from(region.width) + u64::from(x - region.x);
+        self.light_path(index, place)
+    }
+
+    /// The numbers of a light subpath of an index.
+    pub(super) fn light_path(&self, index: u32, number: u64) -> Sampler {
+        let id = u64::from(index) * self.rules.light_paths as u64 + number;
+        Sampler::light(self.settings.seed, self.batch.replicate, id)
+    }
+
+    /// The numbers of a pixel's sample, and its camera ray.
+    pub(super) fn eye(&self, pixel: [u32; 2], index: u32) -> (Sampler, Ray) {
+        let eye = Sampler::new(self.settings.seed, self.batch.replicate, pixel, index);
+        let ray = camera_ray(self.scene, self.settings, pixel, &eye);
+        (eye, ray)
+    }
+}
