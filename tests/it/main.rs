@@ -7,6 +7,7 @@ mod closed_forms;
 mod faults;
 mod methods;
 mod motion;
+mod radiosity;
 mod same_bits;
 mod techniques;
 mod tidy;

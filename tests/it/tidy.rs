@@ -6,8 +6,21 @@ use std::{
 };
 
 /// Rooms of `core`, bottom to top: a room may use itself and those before it.
-const ROOMS: [&str; 11] =
-    ["math", "sampler", "bsdf", "trace", "film", "scene", "gltf", "settings", "path", "method", "render"];
+const ROOMS: [&str; 13] = [
+    "math",
+    "sampler",
+    "bsdf",
+    "trace",
+    "film",
+    "scene",
+    "gltf",
+    "settings",
+    "path",
+    "radiosity",
+    "bake",
+    "method",
+    "render",
+];
 /// Rooms of the `server` library, bottom to top.
 const SERVER_ROOMS: [&str; 6] = ["store", "blobs", "farm", "inspect", "api", "serve"];
 /// What `film` may not know though it stands above it: a sum does not know what a scene is made of.

@@ -8,8 +8,11 @@ use ovtigre_core::{
         schedule::Schedule,
         size::{Region, Size},
     },
-    render::{batch::render, prepare::prepare, progress::Progress},
-    scene::Scene,
+    render::{
+        batch::render,
+        prepare::{Prepared, prepare},
+        progress::Progress,
+    },
     settings::{
         CameraChoice, Environment, EnvironmentSource, FULL, Gloss, Method, Settings, Shadows, Shutter,
         Weights,
@@ -63,7 +66,7 @@ pub fn in_environment(mut settings: Settings, radiance: f32) -> Settings {
 }
 
 /// A scene's trees and lights.
-pub fn scene(glb: &[u8], settings: &Settings) -> Scene {
+pub fn scene(glb: &[u8], settings: &Settings) -> Prepared {
     prepare(glb, None, settings).expect("a scene that can be rendered")
 }
 

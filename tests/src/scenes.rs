@@ -133,3 +133,83 @@ pub fn over_floor(reflectance: f32, add: impl FnOnce(&mut Glb)) -> Vec<u8> {
     add(&mut glb);
     glb.finish()
 }
+
+/// A pure Lambert material of a colour.
+pub fn coloured_lambert(rgb: [f32; 3]) -> Value {
+    let mut material = lambert(0.0, 0.0);
+    material["pbrMetallicRoughness"]["baseColorFactor"] = json!([rgb[0], rgb[1], rgb[2], 1.0]);
+    material
+}
+
+/// Adds a body of its own node, mesh and material.
+pub fn add(
+    glb: &mut Glb,
+    name: &str,
+    mut material: Value,
+    (positions, triangles): (Vec<Vec3>, Vec<[u32; 3]>),
+) {
+    material["name"] = json!(name);
+    let material = glb.material(material);
+    let mesh = glb.mesh(&positions, &triangles, material);
+    glb.node(json!({"mesh": mesh, "name": name}));
+}
+
+/// The six sides of a box as seen from within: left, right, floor, ceiling, back, front.
+pub fn walls(low: Vec3, high: Vec3) -> [(Vec<Vec3>, Vec<[u32; 3]>); 6] {
+    let (positions, triangles) = flipped(cuboid(low, high));
+    std::array::from_fn(|side| {
+        let triangles = &triangles[2 * side..2 * side + 2];
+        let mut used: Vec<u32> = triangles.as_flattened().to_vec();
+        used.sort_unstable();
+        used.dedup();
+        let number = |v: u32| used.iter().position(|u| *u == v).expect("a vertex in use") as u32;
+        let moved = triangles.iter().map(|t| t.map(number)).collect();
+        (used.iter().map(|&v| positions[v as usize]).collect(), moved)
+    })
+}
+
+/// A box of side 2 around the origin, open in front, with a lamp under its ceiling and two blocks, all Lambert.
+pub fn cornell() -> Vec<u8> {
+    let mut glb = Glb::new();
+    let [left, right, ground, ceiling, back, _] = walls(Vec3::splat(-1.0), Vec3::ONE);
+    add(&mut glb, "left", coloured_lambert([0.63, 0.065, 0.05]), left);
+    add(&mut glb, "right", coloured_lambert([0.14, 0.45, 0.091]), right);
+    for (name, side) in [("floor", ground), ("ceiling", ceiling), ("back", back)] {
+        add(&mut glb, name, lambert(0.7, 0.0), side);
+    }
+    add(&mut glb, "lamp", lambert(0.0, 12.0), flipped(floor(0.98, 0.6, 0.0, 0.0)));
+    let block = |low: Vec3, high: Vec3, degrees: f32| {
+        let (positions, triangles) = cuboid(low, high);
+        let centre = (low + high) * 0.5;
+        let turn = glam::Quat::from_rotation_y(degrees.to_radians());
+        (positions.iter().map(|p| turn * (*p - centre) + centre).collect(), triangles)
+    };
+    let low = block(Vec3::new(0.05, -1.0, 0.05), Vec3::new(0.65, -0.4, 0.65), 18.0);
+    let high = block(Vec3::new(-0.65, -1.0, -0.6), Vec3::new(-0.05, 0.2, 0.0), -20.0);
+    add(&mut glb, "low block", lambert(0.7, 0.0), low);
+    add(&mut glb, "high block", lambert(0.7, 0.0), high);
+    glb.perspective(Vec3::new(0.0, 0.0, 4.2), Vec3::ZERO, 36.0);
+    glb.finish()
+}
+
+/// Two closed rooms side by side with a doorway between them, lit in the one and seen in the other, all Lambert.
+pub fn two_rooms() -> Vec<u8> {
+    let mut glb = Glb::new();
+    let (low, high) = (Vec3::new(-2.0, 0.0, -1.0), Vec3::new(2.0, 2.0, 1.0));
+    let [left, right, ground, ceiling, back, front] = walls(low, high);
+    add(&mut glb, "left", lambert(0.7, 0.0), left);
+    add(&mut glb, "right", coloured_lambert([0.7, 0.4, 0.3]), right);
+    for (name, side) in [("floor", ground), ("ceiling", ceiling), ("back", back), ("front", front)] {
+        add(&mut glb, name, lambert(0.6, 0.0), side);
+    }
+    for (name, from, to) in [
+        ("wall behind the door", Vec3::new(-0.05, 0.0, -1.0), Vec3::new(0.05, 2.0, -0.3)),
+        ("wall before the door", Vec3::new(-0.05, 0.0, 0.4), Vec3::new(0.05, 2.0, 1.0)),
+        ("wall above the door", Vec3::new(-0.05, 1.5, -0.3), Vec3::new(0.05, 2.0, 0.4)),
+    ] {
+        add(&mut glb, name, lambert(0.6, 0.0), cuboid(from, to));
+    }
+    add(&mut glb, "lamp", lambert(0.0, 10.0), flipped(floor(1.98, 0.8, -1.0, 0.0)));
+    glb.perspective(Vec3::new(0.4, 1.0, 0.9), Vec3::new(1.6, 0.8, -0.8), 75.0);
+    glb.finish()
+}

@@ -2,8 +2,12 @@
 
 use ovtigre_core::{
     film::{batch::Batch, sum::Sum},
-    render::{batch::render, prepare::prepare, profile::NUMERIC_PROFILE, progress::Progress},
-    scene::Scene,
+    render::{
+        batch::render,
+        prepare::{Prepared, prepare},
+        profile::NUMERIC_PROFILE,
+        progress::Progress,
+    },
     settings::Settings,
 };
 use std::sync::Arc;
@@ -39,7 +43,7 @@ pub trait Renderer: Send + Sync + 'static {
 pub struct Core;
 
 impl Renderer for Core {
-    type Scene = Scene;
+    type Scene = Prepared;
 
     fn instruction_set(&self) -> &'static str {
         NUMERIC_PROFILE
@@ -50,11 +54,17 @@ impl Renderer for Core {
         scene: Arc<[u8]>,
         environment: Option<&[u8]>,
         settings: &Settings,
-    ) -> Result<Scene, String> {
+    ) -> Result<Prepared, String> {
         prepare(scene, environment, settings).map_err(|e| e.to_string())
     }
 
-    fn render(&self, scene: &Scene, settings: &Settings, batch: Batch, progress: &Progress) -> Option<Sum> {
+    fn render(
+        &self,
+        scene: &Prepared,
+        settings: &Settings,
+        batch: Batch,
+        progress: &Progress,
+    ) -> Option<Sum> {
         render(scene, settings, batch, progress).ok()
     }
 }

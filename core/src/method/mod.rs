@@ -5,3 +5,4 @@ pub mod camera;
 pub mod light;
 pub mod path;
 pub mod photon;
+pub mod radiosity;

@@ -7,10 +7,10 @@ use crate::film::sum::{Plane, Sum};
 use crate::path::expression::error::ExpressionError;
 use crate::path::rules::Rules;
 use crate::path::throughput::{Carriage, Everything, Filtered};
+use crate::render::prepare::Prepared;
 use crate::render::progress::Progress;
 use crate::render::sample::Sampling;
 use crate::render::{passes, splats, tile};
-use crate::scene::Scene;
 use crate::settings::{Method, Settings};
 
 /// A batch gave no sum.
@@ -27,14 +27,16 @@ pub enum RenderError {
 /// The sum of a batch. Runs on the current rayon pool; the same arguments give the same bits on any number of threads:
 /// a pixel's samples are added in f64 in a fixed order.
 pub fn render(
-    scene: &Scene,
+    prepared: &Prepared,
     settings: &Settings,
     batch: Batch,
     progress: &Progress,
 ) -> Result<Sum, RenderError> {
     assert!(batch.region.is_in(settings.size), "the batch's region is not in the frame");
+    let scene = &prepared.scene;
     let rules = Rules::new(scene, settings, batch.region.pixels())?;
-    let sampling = Sampling { scene, settings, rules: &rules, batch };
+    let radiosity = prepared.radiosity.as_deref();
+    let sampling = Sampling { scene, radiosity, settings, rules: &rules, batch };
     if rules.is_everything() {
         run::<Everything>(&sampling, progress)
     } else {

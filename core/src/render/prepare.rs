@@ -4,13 +4,16 @@ use crate::gltf::bundle::Bundle;
 use crate::gltf::error::LoadError;
 use crate::gltf::limits::Limits;
 use crate::gltf::load::load_while;
+use crate::method::radiosity::Reconstruction;
+use crate::radiosity::fineness::Fineness;
+use crate::radiosity::solution::{Solution, TooManyTriangles};
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
 use crate::scene::data::SceneData;
 use crate::scene::environment::{Environment, EnvironmentError};
 use crate::scene::material::Material;
 use crate::scene::view::{LensInScene, Views};
-use crate::settings::{CameraChoice, EnvironmentSource, Settings};
+use crate::settings::{CameraChoice, EnvironmentSource, Method, Settings};
 use crate::trace::build_error::BuildError;
 use std::sync::Arc;
 
@@ -37,11 +40,40 @@ pub enum PrepareError {
     /// The trees cannot be built.
     #[error(transparent)]
     Build(#[from] BuildError),
+    /// The scene has no finite elements.
+    #[error(transparent)]
+    Radiosity(#[from] TooManyTriangles),
+}
+
+/// All that batches of a scene are rendered from.
+#[derive(Clone, Debug)]
+pub struct Prepared {
+    /// The scene.
+    pub scene: Scene,
+    /// Its diffuse light, where the method is [`Method::Radiosity`]. It does not depend on the choice of random sequences.
+    pub radiosity: Option<Arc<Solution>>,
+}
+
+/// Makes a scene ready to be rendered: [`open`], and what the method needs beside.
+pub fn prepare(
+    bytes: impl Into<Arc<[u8]>>,
+    environment: Option<&[u8]>,
+    settings: &Settings,
+) -> Result<Prepared, PrepareError> {
+    let scene = open(bytes, environment, settings)?;
+    let radiosity = match settings.method {
+        Method::Radiosity => {
+            let scatterings = Reconstruction::Gather.scatterings(settings.bounces);
+            Some(Arc::new(Solution::new(&scene, settings.shadows, scatterings, Fineness::default())?))
+        }
+        Method::Path | Method::Light | Method::Bidirectional | Method::Photon => None,
+    };
+    Ok(Prepared { scene, radiosity })
 }
 
 /// Reads a scene, builds its trees and gathers its lights. `environment` holds the bytes of the image that the
 /// settings name, if they do. A scene that nothing lights gets a default sky.
-pub fn prepare(
+pub fn open(
     bytes: impl Into<Arc<[u8]>>,
     environment: Option<&[u8]>,
     settings: &Settings,

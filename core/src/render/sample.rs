@@ -1,10 +1,12 @@
 //! One sample by the settings' method.
 
 use crate::film::batch::Batch;
-use crate::method::{bidirectional, camera::camera_ray, light, path};
+use crate::method::radiosity::Reconstruction;
+use crate::method::{bidirectional, camera::camera_ray, light, path, radiosity};
 use crate::path::rules::Rules;
 use crate::path::tally::Tally;
 use crate::path::throughput::Carriage;
+use crate::radiosity::solution::Solution;
 use crate::sampler::{Dimension, Sampler};
 use crate::scene::Scene;
 use crate::settings::{Method, Settings};
@@ -15,6 +17,8 @@ use crate::trace::ray::Ray;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sampling<'a> {
     pub(super) scene: &'a Scene,
+    /// Where the method is radiosity.
+    pub(super) radiosity: Option<&'a Solution>,
     pub(super) settings: &'a Settings,
     pub(super) rules: &'a Rules,
     pub(super) batch: Batch,
@@ -37,6 +41,13 @@ impl Sampling<'_> {
                 let (eye, ray) = self.eye(pixel, index);
                 let light = self.light(pixel, index);
                 bidirectional::sample::<C>(scene, rules, ray, [&eye, &light], tally);
+            }
+            Method::Radiosity => {
+                let solution = self.radiosity.expect("prepared for this method");
+                let eye = Sampler::new(settings.seed, self.batch.replicate, pixel, index);
+                let how = Reconstruction::Gather;
+                tally.planes[0] +=
+                    radiosity::sample(scene, solution, settings, how, pixel, &eye, &mut tally.rays);
             }
             other => unreachable!("{} is refused when a job is submitted", other.name()),
         }

@@ -1,8 +1,8 @@
 //! The command line.
 
 use super::{
-    cancel, check, compare, exit::Outcome, fetch, pause, render, resume, serve, status, submit, terminal,
-    watch, work, workers,
+    bake, cancel, check, compare, exit::Outcome, fetch, pause, render, resume, serve, status, submit,
+    terminal, watch, work, workers,
 };
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -41,6 +41,8 @@ enum Command {
     Workers(workers::Workers),
     /// Say what is in a scene, what a render of it needs and leaves out, and every problem.
     Check(check::Check),
+    /// Solve the diffuse light of a scene and write it as a glTF scene that other viewers show.
+    Bake(bake::Bake),
     /// Compare two pictures.
     Compare(compare::Compare),
 }
@@ -83,6 +85,7 @@ impl Command {
             Self::Cancel(command) => command.run().await?,
             Self::Workers(command) => command.run().await?,
             Self::Check(command) => command.run()?,
+            Self::Bake(command) => command.run().await?,
             Self::Compare(command) => return command.run(),
         }
         Ok(ExitCode::SUCCESS)

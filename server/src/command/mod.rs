@@ -4,6 +4,7 @@ pub(crate) mod exit;
 pub(crate) mod line;
 pub(crate) mod terminal;
 
+mod bake;
 mod cancel;
 mod check;
 mod compare;

@@ -89,8 +89,13 @@ pub(crate) async fn save(answer: Answer, path: &Path) -> Outcome {
 
 /// Writes text to `path`, over what is there, at its end.
 pub(crate) fn save_text(text: &str, path: &Path) -> Outcome {
+    save_bytes(text.as_bytes(), path)
+}
+
+/// Writes bytes to `path`, over what is there, at its end.
+pub(crate) fn save_bytes(bytes: &[u8], path: &Path) -> Outcome {
     let mut part = part_of(path)?;
-    part.write_all(text.as_bytes()).map_err(|e| unwritable(path, &e))?;
+    part.write_all(bytes).map_err(|e| unwritable(path, &e))?;
     put(part, path)
 }
 

@@ -1,7 +1,7 @@
 //! Which paths a job shows and how they are estimated: every wish checked, alone and with the others.
 
 use ovtigre_core::{
-    bsdf::event::{Letter, Letters},
+    bsdf::event::Letter,
     path::expression::{
         error::ExpressionError,
         language::{Language, RULES_MAX},
@@ -23,7 +23,10 @@ const NARROW: &str = "narrow";
 /// Vertices of either subpath of a technique.
 const VERTICES_MAX: u32 = 255;
 /// Methods that this version renders by.
-const RENDERED: [Method; 4] = [Method::Path, Method::Light, Method::Bidirectional, Method::Photon];
+const RENDERED: [Method; 5] =
+    [Method::Path, Method::Light, Method::Bidirectional, Method::Photon, Method::Radiosity];
+/// What method `radiosity` solves.
+const DIFFUSE: &str = "LD*E";
 
 /// What a job shows, and how.
 #[derive(Clone, Debug, PartialEq)]
@@ -61,8 +64,8 @@ pub fn choose(request: &JobRequest, note: &mut impl FnMut(&str, String)) -> (Cho
         chosen.layers.push(Layer { name: NARROW.to_owned(), shows: Shows::Narrow });
     }
     let language = compile(&chosen, pointer, note);
-    if let Some(language) = &language {
-        fits(request, &chosen, language, pointer, note);
+    if language.is_some() {
+        fits(request, &chosen, pointer, note);
     }
     (chosen, language)
 }
@@ -70,7 +73,11 @@ pub fn choose(request: &JobRequest, note: &mut impl FnMut(&str, String)) -> (Cho
 /// Where the picture's expression is written, the expression, and what it does to gloss.
 fn picture(request: &JobRequest, note: &mut impl FnMut(&str, String)) -> (&'static str, String, Gloss) {
     let Some(name) = request.preset.as_deref() else {
-        let paths = request.paths.clone().unwrap_or_else(|| FULL.to_owned());
+        let default = match request.method {
+            Some(MethodRequest::Radiosity) => DIFFUSE,
+            _ => FULL,
+        };
+        let paths = request.paths.clone().unwrap_or_else(|| default.to_owned());
         return ("/paths", paths, Gloss::AsItIs);
     };
     if request.paths.is_some() {
@@ -220,13 +227,7 @@ fn compile(chosen: &Chosen, picture: &str, note: &mut impl FnMut(&str, String)) 
 }
 
 /// What needs a certain method, and what a method needs.
-fn fits(
-    request: &JobRequest,
-    chosen: &Chosen,
-    language: &Language,
-    picture: &str,
-    note: &mut impl FnMut(&str, String),
-) {
+fn fits(request: &JobRequest, chosen: &Chosen, picture: &str, note: &mut impl FnMut(&str, String)) {
     let method = chosen.method;
     if method != Method::Bidirectional {
         let needs = |what: &str| format!("{what} need method 'bidirectional', this is '{}'", method.name());
@@ -251,7 +252,17 @@ fn fits(
             note("/shadows", only("light is let through"));
         }
     }
-    if method == Method::Radiosity && !Letters::of(Letter::Diffuse).contains(language.letters()) {
-        note(picture, "method 'radiosity' solves diffuse paths: an expression within LD*E".to_owned());
+    if method == Method::Radiosity {
+        if chosen.paths.split_whitespace().collect::<String>() != DIFFUSE {
+            note(
+                picture,
+                format!(
+                    "method 'radiosity' solves '{DIFFUSE}' as a whole: ask for that, or for another method"
+                ),
+            );
+        }
+        if !chosen.layers.is_empty() {
+            note("/layers", "method 'radiosity' has no layers: leave 'layers' out".to_owned());
+        }
     }
 }

@@ -111,6 +111,11 @@ async fn each_fault_is_told_with_its_place() {
     })
     .await;
     assert!(radiosity.iter().any(|(at, detail)| at == "/paths" && detail.contains("LD*E")), "{radiosity:?}");
+    let layered = faults(&bench, |r| {
+        (r.method, r.layers) = (Some(MethodRequest::Radiosity), vec!["direct=LDE".into()]);
+    })
+    .await;
+    assert!(layered.len() == 1 && layered[0].0 == "/layers", "{layered:?}");
 }
 
 #[tokio::test]
