@@ -45,7 +45,7 @@ pub(crate) fn gather(
     let first = mesh.triangles.len();
     for geometry in &route.shape.geometries {
         let base = mesh.positions.len();
-        let handedness = append_form(lists(mesh), route, geometry);
+        let handedness = append_form(&mut lists(mesh), route, geometry);
         append_rest(mesh, base, geometry);
         append_triangles(mesh, base, geometry, handedness, ids, dropped);
     }
@@ -81,11 +81,11 @@ impl<'a> Moving<'a> {
         let route = |knot| Route { shape, setting: self.stage.setting(shape, place, knot), normalisation };
         for geometry in &shape.geometries {
             let base = self.mesh.positions.len();
-            let handedness = append_form(lists(&mut self.mesh), &route(0), geometry);
+            let handedness = append_form(&mut lists(&mut self.mesh), &route(0), geometry);
             append_rest(&mut self.mesh, base, geometry);
             for (i, form) in self.forms.iter_mut().enumerate() {
                 let Form { positions, normals, tangents } = form;
-                append_form(Lists { positions, normals, tangents }, &route(i + 1), geometry);
+                append_form(&mut Lists { positions, normals, tangents }, &route(i + 1), geometry);
             }
             let all: Vec<&[Vec3]> = std::iter::once(self.mesh.positions.as_slice())
                 .chain(self.forms.iter().map(|form| form.positions.as_slice()))
@@ -129,7 +129,7 @@ fn lists(mesh: &mut Mesh) -> Lists<'_> {
 }
 
 /// Appends a geometry's vertices; whether they were mirrored comes back.
-fn append_form(into: Lists<'_>, route: &Route<'_>, geometry: &Geometry) -> Handedness {
+fn append_form(into: &mut Lists<'_>, route: &Route<'_>, geometry: &Geometry) -> Handedness {
     let setting = &route.setting;
     let vertices = setting.vertices(geometry);
     let before = into.positions.len();

@@ -1,5 +1,6 @@
 //! Where motion is cut into straight pieces.
 
+use crate::gltf::accessor::Source;
 use crate::gltf::animation::Animation;
 use crate::gltf::curve::{Interpolation, Side};
 use crate::gltf::error::{LoadError, Problems};
@@ -63,6 +64,7 @@ struct Cutter<'a, 'b> {
 /// The stage for a shutter that is open from the first to the second of `times`: pieces of motion, cut first where
 /// straight lines stray most from it.
 pub(crate) fn stage<'a>(
+    source: Source<'_>,
     tree: &'a Tree<'a>,
     animation: &Animation<'_>,
     shapes: &[Shape],
@@ -86,7 +88,7 @@ pub(crate) fn stage<'a>(
         cutter.sample(Instant { time: times[1], side: Side::Before })?,
     ];
     let mut pieces = vec![cutter.piece(ends)?];
-    let most = most_pieces(tree, shapes, skins);
+    let most = most_pieces(source, tree, shapes, skins)?;
     loop {
         let worst = (0..pieces.len()).fold(0, |w, i| if pieces[i].strays > pieces[w].strays { i } else { w });
         let strays = pieces[worst].strays;
@@ -108,8 +110,19 @@ pub(crate) fn stage<'a>(
     Ok(Stage::new(tree, skins, knots, poses))
 }
 
-/// Pieces that memory allows for.
-fn most_pieces(tree: &Tree<'_>, shapes: &[Shape], skins: &Skins) -> usize {
+/// Pieces that memory and time allow for.
+fn most_pieces(
+    source: Source<'_>,
+    tree: &Tree<'_>,
+    shapes: &[Shape],
+    skins: &Skins,
+) -> Result<usize, LoadError> {
+    let mut morphed = 0_u64;
+    for shape in shapes.iter().filter(|shape| shape.morphs == Morphs::Yes) {
+        for primitive in source.document.item("meshes", shape.mesh)?.items("primitives")? {
+            morphed = morphed.saturating_add(shape.morphed_vertices(&primitive, source)?);
+        }
+    }
     let joints: usize =
         skins.values().filter(|skin| skin.moves(tree)).map(crate::gltf::skin::Skin::len).sum();
     let deforms = |shape: &&Shape| {
@@ -118,7 +131,8 @@ fn most_pieces(tree: &Tree<'_>, shapes: &[Shape], skins: &Skins) -> usize {
     let triangles: usize =
         shapes.iter().filter(deforms).flat_map(|s| &s.geometries).map(|g| g.triangles.len()).sum();
     let allowed = (MOVERS / (tree.movers.len() + joints).max(1)).min(DEFORMING / triangles.max(1));
-    allowed.clamp(1, PIECES)
+    let in_time = source.limits.morphed_vertices / morphed.max(1);
+    Ok(allowed.min(in_time as usize).clamp(1, PIECES))
 }
 
 /// Times between the shutter's opening and its close at which a key frame of something that moves lies.

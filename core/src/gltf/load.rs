@@ -56,7 +56,7 @@ pub fn load_while(bundle: &Bundle, limits: &Limits, times: [f64; 2]) -> Result<L
     let (mut table, mut dropped) = (TextureTable::default(), Dropped::default());
     let (mut shapes, skins) = shapes::find(source, &tree, &animation, times)?;
     let read = shapes::read(source, &mut shapes, &skins, &mut table, &mut dropped, &mut problems)?;
-    let stage = knots::stage(&tree, &animation, &shapes, &skins, times, &mut problems)?;
+    let stage = knots::stage(source, &tree, &animation, &shapes, &skins, times, &mut problems)?;
     stage.morph(source, &animation, &mut shapes)?;
     let animated = count_animated(&animation, &tree, &shapes);
     let (meshes, instances) = count_uses(&shapes);

@@ -3,6 +3,7 @@
 use crate::gltf::accessor::Source;
 use crate::gltf::animation::Animation;
 use crate::gltf::curve::Side;
+use crate::gltf::document::At;
 use crate::gltf::error::{LoadError, Problems};
 use crate::gltf::geometry::{self, Geometry, Wanted};
 use crate::gltf::materials;
@@ -105,16 +106,15 @@ pub(crate) fn find(
     Ok((shapes, skins))
 }
 
-fn weights(at: &crate::gltf::document::At<'_>) -> Result<Option<Vec<f64>>, LoadError> {
+fn weights(at: &At<'_>) -> Result<Option<Vec<f64>>, LoadError> {
     if at.get("weights").is_none() {
         return Ok(None);
     }
-    let number =
-        |w: &crate::gltf::document::At<'_>| w.value.as_f64().ok_or_else(|| w.error("should be a number"));
+    let number = |w: &At<'_>| w.value.as_f64().ok_or_else(|| w.error("should be a number"));
     at.elements("weights")?.iter().map(number).collect::<Result<_, _>>().map(Some)
 }
 
-fn weights_or_none(at: &crate::gltf::document::At<'_>) -> Result<Vec<f64>, LoadError> {
+fn weights_or_none(at: &At<'_>) -> Result<Vec<f64>, LoadError> {
     Ok(weights(at)?.unwrap_or_default())
 }
 
@@ -176,20 +176,21 @@ fn wanted(read: &materials::Read, shape: &Shape) -> Wanted {
     Wanted { sets, normal_map, influences, morphs: shape.morphs }
 }
 
-/// Counts triangles before any is read.
+/// Counts triangles and vertices to morph before any is read.
 fn check_promised(source: Source<'_>, shapes: &[Shape]) -> Result<(), LoadError> {
-    let mut total = 0_u64;
+    let (mut total, mut morphed) = (0_u64, 0_u64);
     for shape in shapes {
         for primitive in source.document.item("meshes", shape.mesh)?.items("primitives")? {
             total = total.saturating_add(geometry::promised(&primitive, source)?.1);
-            if total > source.limits.triangles {
-                return Err(LoadError::Limit {
-                    file: source.document.file().to_owned(),
-                    pointer: primitive.pointer,
-                    what: "triangles",
-                    found: total,
-                    limit: source.limits.triangles,
-                });
+            morphed = morphed.saturating_add(shape.morphed_vertices(&primitive, source)?);
+            for (what, found, limit) in [
+                ("triangles", total, source.limits.triangles),
+                ("vertices of morph targets", morphed, source.limits.morphed_vertices),
+            ] {
+                if found > limit {
+                    let (file, pointer) = (source.document.file().to_owned(), primitive.pointer);
+                    return Err(LoadError::Limit { file, pointer, what, found, limit });
+                }
             }
         }
     }
@@ -227,6 +228,24 @@ impl Shape {
     /// Whether anything is left of it.
     pub(crate) fn is_empty(&self) -> bool {
         self.geometries.iter().all(|g| g.triangles.is_empty())
+    }
+
+    /// Vertices that a primitive's morph targets move, each target counted, to give it one form.
+    pub(crate) fn morphed_vertices(&self, primitive: &At<'_>, source: Source<'_>) -> Result<u64, LoadError> {
+        let targets = primitive.elements("targets")?.len();
+        let weighted = match self.morphs {
+            Morphs::Yes => targets,
+            Morphs::No => self.weights.iter().take(targets).filter(|w| **w != 0.0).count(),
+        };
+        let accessors = source.document.count("accessors");
+        let vertices =
+            match primitive.object("attributes")?.map(|a| a.index("POSITION", "accessors", accessors)) {
+                Some(index) if weighted > 0 => {
+                    index?.map_or(Ok(0), |index| source.accessor(index).map(|a| a.count))?
+                }
+                _ => 0,
+            };
+        Ok(weighted as u64 * vertices as u64)
     }
 
     /// A box around it, in the mesh's space.

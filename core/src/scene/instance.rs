@@ -128,7 +128,7 @@ impl Motion {
 
     /// Where it has come to. The transform is that by which rays go, to the bit; normals go by its cofactors, which
     /// exist where it is flat.
-    fn at(&self, moment: Moment) -> Moved {
+    pub fn at(&self, moment: Moment) -> Moved {
         let to_world = moment.transform(&self.knots);
         let cofactors = normal_matrix(&glam::Mat3::from(to_world.matrix3).as_dmat3());
         let longest = cofactors.x_axis.length().max(cofactors.y_axis.length()).max(cofactors.z_axis.length());
@@ -142,16 +142,6 @@ impl Motion {
 }
 
 impl Placement {
-    /// Where it is at a moment, which is never moving. What stands is given back as it is; `room` is filled where
-    /// something has to be made.
-    #[inline]
-    pub fn at<'a>(&'a self, moment: Moment, room: &'a mut Option<Self>) -> &'a Self {
-        match self {
-            Self::World | Self::Moved(_) => self,
-            Self::Moving(motion) => room.insert(Self::Moved(motion.at(moment))),
-        }
-    }
-
     /// The transforms at the knots; none of what stands.
     pub fn knots(&self) -> &[Affine3A] {
         match self {

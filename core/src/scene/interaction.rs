@@ -4,7 +4,7 @@ use crate::bsdf::surface::SurfaceParameters;
 use crate::math::colour::Rgb;
 use crate::math::frame::Frame;
 use crate::scene::data::SceneData;
-use crate::scene::instance::{Handedness, Placement};
+use crate::scene::instance::{Handedness, Motion, Placement};
 use crate::scene::material::{Material, Sides, SurfaceCoordinates};
 use crate::scene::mesh::Mesh;
 use crate::scene::texture::Texture;
@@ -44,11 +44,15 @@ impl SceneData {
     /// Corners of a triangle of an instance at a moment, in the scene's space, counter-clockwise seen from the front.
     pub fn corners(&self, instance: u32, triangle: u32, moment: Moment) -> [Vec3; 3] {
         let instance = &self.instances[instance as usize];
-        let mut room = None;
-        let placement = instance.placement.at(moment, &mut room);
-        let [a, b, c] =
-            self.meshes[instance.mesh.index()].corners(triangle, moment).map(|p| placement.point(p));
-        match placement.handedness() {
+        let corners = self.meshes[instance.mesh.index()].corners(triangle, moment);
+        let [a, b, c] = match &instance.placement {
+            Placement::Moving(motion) => {
+                let there = Placement::Moved(motion.at(moment));
+                corners.map(|p| there.point(p))
+            }
+            there => corners.map(|p| there.point(p)),
+        };
+        match instance.placement.handedness() {
             Handedness::Kept => [a, b, c],
             Handedness::Mirrored => [a, c, b],
         }
@@ -72,21 +76,31 @@ impl SceneData {
     ) -> Interaction<'_> {
         let instance = &self.instances[instance as usize];
         let mesh = &self.meshes[instance.mesh.index()];
+        let point = Place { mesh, triangle, weights: weights(barycentric), moment };
+        match &instance.placement {
+            Placement::Moving(motion) => self.interaction_of_moving(point, motion),
+            there => self.interaction_at(point, there),
+        }
+    }
+
+    #[inline(never)]
+    fn interaction_of_moving(&self, point: Place<'_>, motion: &Motion) -> Interaction<'_> {
+        self.interaction_at(point, &Placement::Moved(motion.at(point.moment)))
+    }
+
+    #[inline]
+    fn interaction_at(&self, point: Place<'_>, placement: &Placement) -> Interaction<'_> {
+        let Place { mesh, triangle, weights, moment } = point;
         let material = &self.materials[mesh.materials[triangle as usize].index()];
-        let weights = weights(barycentric);
-        let mut room = None;
-        let placement = instance.placement.at(moment, &mut room);
         let moved = match placement {
             Placement::Moved(moved) => Some(&moved.traced),
             Placement::World | Placement::Moving(_) => None,
         };
-        let point = SurfacePoint::new(mesh.corners(triangle, moment), barycentric, moved);
-        let ng = point.normal;
+        let on = SurfacePoint::new(mesh.corners(triangle, moment), Vec2::new(weights.y, weights.z), moved);
+        let (position, ng) = (on.position, on.normal);
         let at = coordinates(mesh, triangle, weights);
-        let there = Place { mesh, triangle, weights, moment };
-        let shading = shading_frame(there, placement, ng, || material.mapped_normal(&self.textures, &at));
-        let position = point.position;
-        Interaction { position, ng, shading, at, moment, material, textures: &self.textures, point }
+        let shading = shading_frame(point, placement, ng, || material.mapped_normal(&self.textures, &at));
+        Interaction { position, ng, shading, at, moment, material, textures: &self.textures, point: on }
     }
 }
 

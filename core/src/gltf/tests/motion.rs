@@ -446,6 +446,14 @@ fn a_joint_that_is_not_there_is_named() {
 }
 
 #[test]
+fn morph_targets_beyond_the_limit_are_named() {
+    let limits = Limits { morphed_vertices: 2, ..Limits::default() };
+    let error =
+        load_while(&Bundle::open(morphing().glb()).unwrap(), &limits, [0.0; 2]).unwrap_err().to_string();
+    assert!(error.contains("/meshes/0/primitives/0: 3 vertices of morph targets"), "{error}");
+}
+
+#[test]
 fn a_motion_too_wild_to_follow_is_told_of() {
     let mut builder = Builder::triangle(&[], json!({}));
     let times: Vec<f32> = (0..400).map(|i| i as f32).collect();
