@@ -5,3 +5,4 @@ pub mod picture;
 pub mod program;
 pub mod room;
 pub mod scenes;
+pub mod showcase;
