@@ -169,8 +169,8 @@ impl Scene {
         hits.map(|(ray, hit)| {
             let mesh = &self.meshes[self.placements[hit.instance as usize].mesh as usize];
             let vertices = mesh.triangles[hit.triangle as usize].map(|v| mesh.positions[v as usize]);
-            let instance = &self.placed.instances()[hit.instance as usize];
-            let mut point = SurfacePoint::new(vertices, hit.barycentric, instance);
+            let moved = self.placed.instances()[hit.instance as usize].moved.as_ref();
+            let mut point = SurfacePoint::new(vertices, hit.barycentric, moved);
             if point.normal.dot(ray.direction) > 0.0 {
                 point.normal = -point.normal;
             }
@@ -265,7 +265,7 @@ fn rays(criterion: &mut Criterion<ThreadTime>) {
                 let on_light =
                     scene.light[0] + scene.light[1] * random.uniform() + scene.light[2] * random.uniform();
                 let origin = p.leave(on_light - p.position);
-                Ray { origin, direction: on_light - origin, t_max: 1.0 }
+                Ray { t_max: 1.0, ..Ray::new(origin, on_light - origin) }
             })
             .collect();
         for (name, rays) in [("primary", &primary), ("bounce", &bounce)] {

@@ -126,7 +126,7 @@ impl fmt::Display for Shows {
         match self {
             Self::Paths(paths) => f.write_str(paths),
             Self::Strategy(Strategy { s, t }) => write!(f, "({s},{t})"),
-            Self::Narrow => f.write_str("narrow"),
+            Self::Narrow => f.write_str("half the area of gathering"),
         }
     }
 }

@@ -1,7 +1,7 @@
 //! All methods agree.
 
 use glam::Vec3;
-use ovtigre_core::settings::{Lens, Method, Settings};
+use ovtigre_core::settings::{Layer, Lens, Method, Settings, Shows};
 use ovtigre_tests::{
     glb::Glb,
     picture::{in_environment, rendered, settings},
@@ -18,7 +18,7 @@ fn add(glb: &mut Glb, material: Value, (positions, triangles): Mesh) {
 }
 
 /// A room of side 2, open towards the camera, with a lamp under its ceiling, and what `contents` puts in.
-fn room(lamp: f32, contents: impl FnOnce(&mut Glb)) -> Vec<u8> {
+fn room<T>(lamp: f32, contents: impl FnOnce(&mut Glb) -> T) -> Vec<u8> {
     let mut glb = Glb::new();
     let at = Vec3::new;
     add(&mut glb, lambert(0.7, 0.0), floor(-1.0, 2.0, 0.0, 0.0));
@@ -153,16 +153,18 @@ fn a_lens_and_parallel_rays() {
 }
 
 #[test]
-fn photons_scratch() {
-    use ovtigre_core::settings::{Layer, Shows};
-    let glb = room(10.0, |glb| add(glb, lambert(0.8, 0.0), cuboid(Vec3::new(-0.5, -1.0, -0.5), Vec3::new(0.2, 0.1, 0.2))));
-    let s = settings(32, 32, 16);
-    let path = rendered(&glb, &s, 64).mean();
-    println!("path {path:?}");
-    let mut s = by(Method::Photon, &s);
-    s.layers.push(Layer { name: "narrow".into(), shows: Shows::Narrow });
-    for n in [4, 16, 64] {
-        let p = rendered(&glb, &s, n);
-        println!("{n}: {:?} narrow {:?}", p.mean(), p.mean_of(1));
-    }
+fn photons_tell_their_bias() {
+    // What photons miss around edges shrinks with their radius; half the area of gathering tells how much is missing.
+    let contents = cuboid(Vec3::new(-0.5, -1.0, -0.5), Vec3::new(0.2, 0.1, 0.2));
+    let glb = room(10.0, |glb| add(glb, lambert(0.8, 0.0), contents));
+    let settings = settings(64, 64, 16);
+    let (path, _) = rendered(&glb, &settings, 16).mean();
+    let mut photon = by(Method::Photon, &settings);
+    photon.layers.push(Layer { name: "narrow".to_owned(), shows: Shows::Narrow });
+    let picture = rendered(&glb, &photon, 8);
+    let ((wide, error), (narrow, _)) = (picture.mean(), picture.mean_of(1));
+    // What is missing around edges is in proportion to the radius.
+    let extrapolated = wide + (narrow - wide) / (1.0 - 0.5_f64.sqrt());
+    assert!(path - wide > 4.5 * error, "{path} {wide}: there is no bias to tell");
+    assert!((path - extrapolated).abs() < 0.5 * (path - wide), "{path}: {wide}, {narrow}, {extrapolated}");
 }

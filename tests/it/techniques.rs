@@ -100,3 +100,16 @@ fn weighted_techniques_add_up_to_the_terms_of_path_tracing() {
         assert_plane(&path, k + 1, 0.6_f64.powi(k as i32), 0.01, &format!("path, {k} scatterings"));
     }
 }
+
+#[test]
+fn photons_in_a_closed_sphere_make_the_neumann_series() {
+    // A ball around a point of a sphere cuts out a cap of exactly π r², so that gathering has no bias there.
+    let mut settings = settings(32, 32, 16);
+    settings.method = Method::Photon;
+    settings.layers = (0..5).map(bounce).collect();
+    let picture = rendered(&round_furnace(0.5, 1.0), &settings, 24);
+    assert_plane(&picture, 0, 2.0, 0.002, "all of it");
+    for k in 0..5 {
+        assert_plane(&picture, k + 1, 0.5_f64.powi(k as i32), 0.005, &format!("{k} scatterings"));
+    }
+}

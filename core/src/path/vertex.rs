@@ -1,10 +1,8 @@
 //! A point of a path on a surface, and what it does to light.
 
 use crate::bsdf::Bsdf;
-use crate::bsdf::event::{Letter, SampleKind, Scattered, Transport};
+use crate::bsdf::event::{Letter, Letters, SampleKind, Scattered, Transport};
 use crate::math::colour::Rgb;
-use crate::math::robust::offset_origin;
-use crate::path::rules::Rules;
 use crate::scene::interaction::Interaction;
 use crate::trace::ray::Ray;
 use glam::{Vec2, Vec3};
@@ -87,12 +85,12 @@ pub enum Crossing {
 
 impl<'s> Vertex<'s> {
     /// At a point that is seen along −`back`; `None` where the shading normal faces away though the surface
-    /// does not: such a point scatters nothing.
-    pub fn new(at: Interaction<'s>, back: Vec3, _rules: &Rules) -> Option<Self> {
+    /// does not: such a point scatters nothing. Scatters by no letter but `letters`.
+    pub fn new(at: Interaction<'s>, back: Vec3, letters: Letters) -> Option<Self> {
         let wo = at.shading.to_local(back);
         let cos_back = back.dot(at.ng);
         let visible = wo.z * 1.0_f32.copysign(cos_back) > 0.0;
-        visible.then(|| Self { bsdf: Bsdf::from_surface(&at.surface()), at, wo, cos_back })
+        visible.then(|| Self { bsdf: Bsdf::keeping(&at.surface(), letters), at, wo, cos_back })
     }
 
     /// Unit direction back along the path.
@@ -135,8 +133,8 @@ impl<'s> Vertex<'s> {
             SampleKind::Smooth { value, pdf } => {
                 (Weight::Smooth(value * (adjoint / pdf)), Density::SolidAngle(pdf))
             }
-            SampleKind::Specular { weight, .. } => {
-                (Weight::Specular(Letter::Specular, weight * adjoint), Density::Delta)
+            SampleKind::Specular { letter, weight, .. } => {
+                (Weight::Specular(letter, weight * adjoint), Density::Delta)
             }
         };
         let crossing = self.crossing(direction);
@@ -156,12 +154,12 @@ impl<'s> Vertex<'s> {
 
     /// The point moved off the surface towards `direction`.
     pub fn leave(&self, direction: Vec3) -> Vec3 {
-        offset_origin(self.at.position, self.at.error, self.at.ng, direction)
+        self.at.leave(direction)
     }
 
     /// The ray that leaves towards `direction`.
     pub fn ray(&self, direction: Vec3) -> Ray {
-        Ray::new(self.leave(direction), direction)
+        Ray::new(self.leave(direction), direction).at(self.at.moment).at(self.at.moment)
     }
 
     /// Shading normals are no symmetric part of a BSDF: light that is carried from its source counts

@@ -53,7 +53,7 @@ pub fn inspect(bytes: impl Into<Arc<[u8]>>, limits: &Limits) -> Result<Contents,
         count(|k| matches!(k, PunctualKind::Directional { .. })),
     ];
     let (mut needs, mut leaves_out) = (Vec::new(), Vec::new());
-    for (name, needed) in features(data) {
+    for (name, needed) in features(&loaded.report, data) {
         let list = if needed { &mut needs } else { &mut leaves_out };
         list.push(name.to_owned());
     }
@@ -117,7 +117,7 @@ fn letters(material: &Material) -> Letters {
 }
 
 /// Each feature that a scene may need, and whether this one does.
-fn features(data: &SceneData) -> [(&'static str, bool); 11] {
+fn features(report: &Report, data: &SceneData) -> [(&'static str, bool); 14] {
     let any = |of: fn(&Material) -> bool| data.materials.iter().any(of);
     [
         ("triangles", data.meshes.iter().any(|m| !m.triangles.is_empty())),
@@ -131,5 +131,8 @@ fn features(data: &SceneData) -> [(&'static str, bool); 11] {
         ("emissive surfaces", any(Material::emits)),
         ("punctual lights", !data.punctual.is_empty()),
         (DEFAULT_SKY, !is_lit(data)),
+        ("animation", report.animated.nodes > 0),
+        ("skins", report.animated.skins > 0),
+        ("morph targets", report.animated.morphs > 0),
     ]
 }

@@ -3,13 +3,13 @@
 use crate::gltf::bundle::Bundle;
 use crate::gltf::error::LoadError;
 use crate::gltf::limits::Limits;
-use crate::gltf::load::load;
+use crate::gltf::load::load_while;
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
 use crate::scene::data::SceneData;
 use crate::scene::environment::{Environment, EnvironmentError};
 use crate::scene::material::Material;
-use crate::scene::view::{LensInScene, View};
+use crate::scene::view::{LensInScene, Views};
 use crate::settings::{CameraChoice, EnvironmentSource, Settings};
 use crate::trace::build_error::BuildError;
 use std::sync::Arc;
@@ -46,9 +46,10 @@ pub fn prepare(
     environment: Option<&[u8]>,
     settings: &Settings,
 ) -> Result<Scene, PrepareError> {
-    let loaded = load(&Bundle::open(bytes)?, &Limits::default())?;
+    let times = [settings.shutter.open, settings.shutter.close];
+    let loaded = load_while(&Bundle::open(bytes)?, &Limits::default(), times)?;
     let data = loaded.scene;
-    let view = view(&data, settings)?;
+    let views = views(&data, settings)?;
     let given = match &settings.environment {
         None => None,
         Some(given) => Some(match &given.source {
@@ -60,7 +61,7 @@ pub fn prepare(
         }),
     };
     let environment = given.or_else(|| (!is_lit(&data)).then(Environment::default_sky));
-    Ok(Scene::new(data, environment, view)?)
+    Ok(Scene::new(data, environment, views)?)
 }
 
 /// Whether a scene has light of its own.
@@ -68,7 +69,7 @@ pub fn is_lit(data: &SceneData) -> bool {
     !data.punctual.is_empty() || data.materials.iter().any(Material::emits)
 }
 
-fn view(data: &SceneData, settings: &Settings) -> Result<View, PrepareError> {
+fn views(data: &SceneData, settings: &Settings) -> Result<Views, PrepareError> {
     let framed;
     let camera = match settings.camera {
         CameraChoice::Framed => {
@@ -83,5 +84,5 @@ fn view(data: &SceneData, settings: &Settings) -> Result<View, PrepareError> {
         radius: distance(lens.radius),
         focus_distance: distance(lens.focus_distance),
     });
-    Ok(View::new(camera, settings.size, lens))
+    Ok(Views::new(camera, settings.size, lens))
 }

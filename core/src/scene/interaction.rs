@@ -3,12 +3,13 @@
 use crate::bsdf::surface::SurfaceParameters;
 use crate::math::colour::Rgb;
 use crate::math::frame::Frame;
-use crate::math::robust::gamma;
 use crate::scene::data::SceneData;
 use crate::scene::instance::{Handedness, Placement};
 use crate::scene::material::{Material, Sides, SurfaceCoordinates};
 use crate::scene::mesh::Mesh;
 use crate::scene::texture::Texture;
+use crate::trace::moment::Moment;
+use crate::trace::surface_point::SurfacePoint;
 use glam::{Vec2, Vec3, Vec4};
 
 /// A side of a surface.
@@ -25,26 +26,29 @@ pub enum Side {
 pub struct Interaction<'a> {
     /// Where, in the scene's space.
     pub position: Vec3,
-    /// Bound on the error of `position`, by axis.
-    pub error: Vec3,
     /// Unit geometric normal, on the front side.
     pub ng: Vec3,
     /// Shading frame; its `z` is the interpolated and mapped normal, on the front side too.
     pub shading: Frame,
     /// Where on its textures.
     pub at: SurfaceCoordinates,
+    /// When.
+    pub moment: Moment,
     /// The material.
     pub material: &'a Material,
     textures: &'a [Texture],
+    point: SurfacePoint,
 }
 
 impl SceneData {
-    /// Corners of a triangle of an instance, in the scene's space, counter-clockwise seen from the front.
-    pub fn corners(&self, instance: u32, triangle: u32) -> [Vec3; 3] {
+    /// Corners of a triangle of an instance at a moment, in the scene's space, counter-clockwise seen from the front.
+    pub fn corners(&self, instance: u32, triangle: u32, moment: Moment) -> [Vec3; 3] {
         let instance = &self.instances[instance as usize];
+        let mut room = None;
+        let placement = instance.placement.at(moment, &mut room);
         let [a, b, c] =
-            self.meshes[instance.mesh.index()].corners(triangle).map(|p| instance.placement.point(p));
-        match instance.placement.handedness() {
+            self.meshes[instance.mesh.index()].corners(triangle, moment).map(|p| placement.point(p));
+        match placement.handedness() {
             Handedness::Kept => [a, b, c],
             Handedness::Mirrored => [a, c, b],
         }
@@ -58,20 +62,31 @@ impl SceneData {
         material.alpha(&self.textures, &coordinates(mesh, triangle, weights(barycentric)))
     }
 
-    /// The point of a triangle with the given weights of its second and third corner (in the mesh's order).
-    pub fn interaction(&self, instance: u32, triangle: u32, barycentric: Vec2) -> Interaction<'_> {
+    /// The point of a triangle with the given weights of its second and third corner (in the mesh's order), at a moment.
+    pub fn interaction(
+        &self,
+        instance: u32,
+        triangle: u32,
+        barycentric: Vec2,
+        moment: Moment,
+    ) -> Interaction<'_> {
         let instance = &self.instances[instance as usize];
         let mesh = &self.meshes[instance.mesh.index()];
         let material = &self.materials[mesh.materials[triangle as usize].index()];
         let weights = weights(barycentric);
-        let corners = mesh.corners(triangle);
-        let (position, error) = place(&instance.placement, corners, weights);
-        let ng = geometric_normal(&instance.placement, corners);
+        let mut room = None;
+        let placement = instance.placement.at(moment, &mut room);
+        let moved = match placement {
+            Placement::Moved(moved) => Some(&moved.traced),
+            Placement::World | Placement::Moving(_) => None,
+        };
+        let point = SurfacePoint::new(mesh.corners(triangle, moment), barycentric, moved);
+        let ng = point.normal;
         let at = coordinates(mesh, triangle, weights);
-        let shading = shading_frame(mesh, triangle, weights, &instance.placement, ng, || {
-            material.mapped_normal(&self.textures, &at)
-        });
-        Interaction { position, error, ng, shading, at, material, textures: &self.textures }
+        let there = Place { mesh, triangle, weights, moment };
+        let shading = shading_frame(there, placement, ng, || material.mapped_normal(&self.textures, &at));
+        let position = point.position;
+        Interaction { position, ng, shading, at, moment, material, textures: &self.textures, point }
     }
 }
 
@@ -85,35 +100,6 @@ fn mix<T: Copy + std::ops::Mul<f32, Output = T> + std::ops::Add<Output = T>>(v: 
     v[0] * w.x + v[1] * w.y + v[2] * w.z
 }
 
-/// Point and error bound: γ₇ Σ|bᵢvᵢ| for the combination, a transform adds its own rounding and carries the
-/// error through (pbrt §6.8). The largest axis counts for all: a triangle in the plane y = 0 has no error in y,
-/// but the distance along a ray is computed from all three, and with the axes apart 2 % of the light between a
-/// floor at 0 and a lamp near it was lost to hits on the floor itself.
-fn place(placement: &Placement, corners: [Vec3; 3], weights: Vec3) -> (Vec3, Vec3) {
-    let position = mix(corners, weights);
-    let magnitude = mix(corners.map(Vec3::abs), weights.abs());
-    let error = Vec3::splat(magnitude.max_element() * gamma(7.0));
-    match placement {
-        Placement::World => (position, error),
-        Placement::Moved(moved) => {
-            let m = moved.to_world.matrix3;
-            let absolute =
-                |v: Vec3| Vec3::from(m.x_axis.abs() * v.x + m.y_axis.abs() * v.y + m.z_axis.abs() * v.z);
-            let translation = Vec3::from(moved.to_world.translation).abs();
-            let rounding = (absolute(position.abs()) + translation) * gamma(3.0);
-            let error = absolute(error) * (1.0 + gamma(3.0)) + rounding;
-            (moved.to_world.transform_point3(position), Vec3::splat(error.max_element()))
-        }
-    }
-}
-
-/// Unit normal by winding, from differences taken in double precision: slivers keep theirs.
-fn geometric_normal(placement: &Placement, corners: [Vec3; 3]) -> Vec3 {
-    let [a, b, c] = corners.map(Vec3::as_dvec3);
-    let normal = (b - a).cross(c - a).normalize_or_zero().as_vec3();
-    placement.normal(normal)
-}
-
 fn coordinates(mesh: &Mesh, triangle: u32, weights: Vec3) -> SurfaceCoordinates {
     let corners = mesh.triangles[triangle as usize].map(|v| v as usize);
     let uv =
@@ -123,12 +109,19 @@ fn coordinates(mesh: &Mesh, triangle: u32, weights: Vec3) -> SurfaceCoordinates 
     SurfaceCoordinates { uvs: [uv(&mesh.uvs[0]), uv(&mesh.uvs[1])], colour }
 }
 
+/// A point of a mesh at a moment.
+#[derive(Clone, Copy)]
+struct Place<'a> {
+    mesh: &'a Mesh,
+    triangle: u32,
+    weights: Vec3,
+    moment: Moment,
+}
+
 /// Interpolated normal, then the normal map in the frame of tangent and bitangent. What vanishes on the
 /// way falls back to the step before; a normal on the back side is turned to the front.
 fn shading_frame(
-    mesh: &Mesh,
-    triangle: u32,
-    weights: Vec3,
+    Place { mesh, triangle, weights, moment }: Place<'_>,
     placement: &Placement,
     ng: Vec3,
     map: impl FnOnce() -> Option<Vec3>,
@@ -136,13 +129,13 @@ fn shading_frame(
     let corners = mesh.triangles[triangle as usize].map(|v| v as usize);
     let mut normal = ng;
     if !mesh.normals.is_empty() {
-        let smooth = placement.normal(mix(corners.map(|v| mesh.normals[v]), weights));
+        let smooth = placement.normal(mix(mesh.normals(corners, moment), weights));
         normal = front(smooth.try_normalize().unwrap_or(ng), ng);
     }
     if mesh.tangents.is_empty() {
         return Frame::around(normal);
     }
-    let mixed = mix(corners.map(|v| mesh.tangents[v]), weights);
+    let mixed = mix(mesh.tangents(corners, moment), weights);
     if mixed.truncate() == Vec3::ZERO {
         return Frame::around(normal);
     }
@@ -172,6 +165,19 @@ fn front(normal: Vec3, ng: Vec3) -> Vec3 {
 }
 
 impl Interaction<'_> {
+    /// Bound on the error of `position`, on every axis.
+    #[inline]
+    pub fn error(&self) -> f32 {
+        self.point.error
+    }
+
+    /// Where a ray that leaves in `direction` must start so that it does not meet this surface again and stays on this
+    /// side of the neighbouring ones.
+    #[inline]
+    pub fn leave(&self, direction: Vec3) -> Vec3 {
+        self.point.leave(direction)
+    }
+
     /// The side that a direction away from the surface leaves on.
     #[inline]
     pub fn side(&self, direction: Vec3) -> Side {

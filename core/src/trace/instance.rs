@@ -21,13 +21,18 @@ pub struct Instance {
     pub mesh: u32,
     /// From the mesh's space to the world's.
     pub to_world: Affine3A,
-    /// `None` where `to_world` is the identity.
-    pub(super) moved: Option<Moved>,
+    /// `None` where `to_world` is the identity and stays so.
+    pub moved: Option<Moved>,
+    /// Its number among those that move, or [`STANDS`].
+    pub(super) motion: u32,
 }
+
+/// No motion has this number.
+pub(super) const STANDS: u32 = u32::MAX;
 
 /// What follows from a transform that is not the identity. Matrices are rows.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Moved {
+pub struct Moved {
     /// The linear part of `to_world`.
     linear: [Vec3; 3],
     /// Its inverse, made in f64.
@@ -44,7 +49,29 @@ impl Instance {
     pub(super) fn new(placement: Placement) -> Option<Self> {
         let Placement { mesh, to_world } = placement;
         let moved = if to_world == Affine3A::IDENTITY { None } else { Some(Moved::new(to_world)?) };
-        Some(Self { mesh, to_world, moved })
+        Some(Self { mesh, to_world, moved, motion: STANDS })
+    }
+
+    /// What goes from transform to transform, of which `first` is one and `motion` its number among those that move.
+    pub(super) fn moving(mesh: u32, first: Affine3A, motion: u32) -> Option<Self> {
+        Some(Self { mesh, to_world: first, moved: Some(Moved::new(first)?), motion })
+    }
+
+    /// The box around the mesh's box on its way along the transforms of `knots`, rounded outward; `None` where it leaves
+    /// 2⁶⁰ or a transform cannot be inverted.
+    pub(super) fn bounds_on(knots: &[Affine3A], mesh: Bounds) -> Option<Bounds> {
+        if mesh.is_empty() {
+            return Some(mesh);
+        }
+        let mut all = Bounds::EMPTY;
+        for &knot in knots {
+            all = all.union(Moved::new(knot)?.bounds(mesh));
+        }
+        // Halfway between knots the inverse may be larger than at them, and so its rounding, which is 2⁻²² of the way
+        // from the origin at a knot.
+        let room = Vec3::splat(all.reach() * (1.0 / (1 << 19) as f32));
+        let all = Bounds { min: all.min - room, max: all.max + room };
+        (all.reach() <= LARGEST_COORDINATE).then_some(all)
     }
 
     /// The box around the mesh's box in the world, rounded outward; `None` where it leaves 2⁶⁰.
@@ -58,7 +85,8 @@ impl Instance {
 }
 
 impl Moved {
-    fn new(to_world: Affine3A) -> Option<Self> {
+    /// `None` where the transform is not finite or cannot be inverted.
+    pub fn new(to_world: Affine3A) -> Option<Self> {
         let matrix = DMat3::from_cols(
             to_world.matrix3.x_axis.as_dvec3(),
             to_world.matrix3.y_axis.as_dvec3(),
@@ -104,15 +132,20 @@ impl Moved {
         (turned + self.translation, error * (1.0 + gamma(8.0)))
     }
 
-    /// The normal of the surface spanned by two edges of the mesh, in the world and of any length. In a mirrored
-    /// instance the front stays the front.
-    pub(super) fn cross_outward(&self, first: DVec3, second: DVec3) -> DVec3 {
-        let turn = |v: DVec3| DVec3::from_array(self.linear.map(|row| row.as_dvec3().dot(v)));
-        let cross = turn(first).cross(turn(second));
-        if self.mirrored { -cross } else { cross }
+    /// An edge of the mesh in the world.
+    #[inline]
+    pub(super) fn edge_outward(&self, edge: DVec3) -> DVec3 {
+        DVec3::from_array(self.linear.map(|row| row.as_dvec3().dot(edge)))
     }
 
-    fn bounds(&self, mesh: Bounds) -> Bounds {
+    /// Whether the transform is a mirror.
+    #[inline]
+    pub(super) fn mirrors(&self) -> bool {
+        self.mirrored
+    }
+
+    /// The box around the mesh's box, rounded outward.
+    pub(super) fn bounds(&self, mesh: Bounds) -> Bounds {
         let (mut min, mut max) = (Vec3::ZERO, Vec3::ZERO);
         for axis in 0..3 {
             let row = self.linear[axis].as_dvec3();

@@ -10,7 +10,10 @@ pub mod build_error;
 mod collapse;
 pub mod instance;
 mod lanes;
+#[cfg(test)]
+mod leaving;
 pub mod mesh;
+pub mod moment;
 mod prepared;
 pub mod ray;
 pub mod surface_point;

@@ -48,8 +48,7 @@ pub(crate) struct JobFlags {
     /// How light is estimated [default: auto].
     #[arg(long, value_parser = named::<MethodRequest>(&["auto", "path", "light", "bidirectional", "photon", "radiosity"]))]
     pub(crate) method: Option<MethodRequest>,
-    /// A further picture of only those paths, of a technique (s,t) of bidirectional, or narrow: of photons gathered
-    /// from half the area; repeatable.
+    /// A further picture of only those paths, or of a technique (s,t) of bidirectional; repeatable.
     #[arg(long = "layer", value_name = "NAME=EXPR", value_parser = layer)]
     pub(crate) layers: Vec<String>,
     /// Only these (s,t) techniques of bidirectional, such as "0,3;1,2" [default: all].
@@ -170,7 +169,7 @@ fn layer(text: &str) -> Result<String, String> {
     match text.split_once('=') {
         Some((name, shows)) if !name.trim().is_empty() && !shows.trim().is_empty() => {
             let technique = shows.trim().starts_with('(') && shows.contains(',') && !shows.contains('{');
-            if !technique && shows.trim() != "narrow" {
+            if !technique {
                 paths(shows)?;
             }
             Ok(text.to_owned())

@@ -17,8 +17,8 @@ const LAYERS_MAX: usize = RULES_MAX - 1;
 /// Longest name of a layer.
 const NAME_MAX: usize = 64;
 /// Names that a picture's channels or its parts have already.
-const TAKEN: [&str; 5] = ["R", "G", "B", "error", "picture"];
-/// What a layer of `photon` shows that is gathered from half the area.
+const TAKEN: [&str; 6] = ["R", "G", "B", "error", "picture", NARROW];
+/// The layer that tells the bias of photons.
 const NARROW: &str = "narrow";
 /// Vertices of either subpath of a technique.
 const VERTICES_MAX: u32 = 255;
@@ -48,7 +48,7 @@ pub struct Chosen {
 pub fn choose(request: &JobRequest, note: &mut impl FnMut(&str, String)) -> (Chosen, Option<Language>) {
     let (pointer, paths, gloss) = picture(request, note);
     let method = method(request, note);
-    let chosen = Chosen {
+    let mut chosen = Chosen {
         layers: layers(request, note),
         strategies: strategies(request, note),
         weights: weights(request),
@@ -57,6 +57,9 @@ pub fn choose(request: &JobRequest, note: &mut impl FnMut(&str, String)) -> (Cho
         gloss,
         method,
     };
+    if chosen.method == Method::Photon && chosen.layers.len() < LAYERS_MAX {
+        chosen.layers.push(Layer { name: NARROW.to_owned(), shows: Shows::Narrow });
+    }
     let language = compile(&chosen, pointer, note);
     if let Some(language) = &language {
         fits(request, &chosen, language, pointer, note);
@@ -134,7 +137,7 @@ fn at_layer(number: usize) -> String {
     format!("/layers/{number}")
 }
 
-/// `NAME=EXPR`, `NAME=(s,t)` or `NAME=narrow`.
+/// `NAME=EXPR` or `NAME=(s,t)`.
 fn layer(text: &str) -> Result<Layer, String> {
     let (name, shows) =
         text.split_once('=').ok_or_else(|| "a layer is written NAME=EXPR, such as direct=LDE".to_owned())?;
@@ -147,9 +150,6 @@ fn layer(text: &str) -> Result<Layer, String> {
         return Err(format!("a layer cannot be named '{name}': a picture has that already"));
     }
     let inside = shows.trim().strip_prefix('(').and_then(|rest| rest.strip_suffix(')'));
-    if shows.trim() == NARROW {
-        return Ok(Layer { name: name.to_owned(), shows: Shows::Narrow });
-    }
     let shows = match inside.filter(|inside| inside.trim_start().starts_with(|c: char| c.is_ascii_digit())) {
         Some(pair) => Shows::Strategy(strategy(pair)?),
         None => Shows::Paths(shows.to_owned()),
@@ -239,14 +239,6 @@ fn fits(
         for (i, layer) in chosen.layers.iter().enumerate() {
             if matches!(layer.shows, Shows::Strategy(_)) {
                 note(&at_layer(i), needs("layers of a technique"));
-            }
-        }
-    }
-    if method != Method::Photon {
-        for (i, layer) in chosen.layers.iter().enumerate() {
-            if layer.shows == Shows::Narrow {
-                let name = method.name();
-                note(&at_layer(i), format!("'{NARROW}' is a layer of method 'photon', this is '{name}'"));
             }
         }
     }

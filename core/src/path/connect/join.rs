@@ -1,7 +1,6 @@
 //! A vertex of an eye subpath joined to one of a light subpath.
 
 use crate::bsdf::event::Transport;
-use crate::math::robust::offset_origin;
 use crate::path::connect::light_vertex::LightVertex;
 use crate::path::connect::unblocked;
 use crate::path::connect::whole::{Joint, whole};
@@ -48,8 +47,7 @@ pub fn join<S: Throughput<EyeState>, L: Throughput<LightState>>(
     if from_light.is_dead() || from_light.total() == Vec3::ZERO {
         return;
     }
-    let there = &light.vertex.at;
-    let end = offset_origin(there.position, there.error, there.ng, -direction);
+    let end = light.vertex.leave(-direction);
     let passes = unblocked::between(walk.scene, vertex, &walk.media, end, tally);
     if passes == Vec3::ZERO {
         return;

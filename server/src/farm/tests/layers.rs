@@ -95,7 +95,7 @@ async fn each_fault_is_told_with_its_place() {
             (r.strategies, r.method) = (Some("1".into()), Some(MethodRequest::Bidirectional));
         }),
         ("/weights", "need method 'bidirectional'", |r| r.weights = Some(WeightsRequest::Power)),
-        ("/layers/0", "a layer of method 'photon'", |r| r.layers = layers(&["a=narrow"])),
+        ("/layers/0", "a picture has that already", |r| r.layers = layers(&["narrow=LDE"])),
         ("/shadows", "only by method 'path'", |r| {
             (r.shadows, r.method) = (Some(Shadows::Off), Some(MethodRequest::Light));
         }),
