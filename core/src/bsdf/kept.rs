@@ -43,8 +43,8 @@ const LOBES: [Lobe; 7] = [
 
 impl Kept {
     /// The lobes of `whole` with one of `letters`; gloss has its twin if `S_T` is one of them.
-    pub(super) fn new(whole: Mixture, letters: Letters) -> Self {
-        Self { whole, letters }
+    pub(super) fn new(whole: &Mixture, letters: Letters) -> Self {
+        Self { whole: *whole, letters }
     }
 
     pub(super) fn letters(&self) -> Letters {

@@ -41,12 +41,8 @@ use glam::{Vec2, Vec3};
 /// A direction with a smaller |cos θ| lies in the surface: products of two still are normal numbers.
 const HORIZON: f32 = 1e-18;
 
-/// What a surface does to light at one point.
+/// What a surface does to light at one point. Built at every hit: no heap, and only the variant's own part is written.
 #[derive(Clone, Copy, Debug)]
-#[expect(
-    clippy::large_enum_variant,
-    reason = "built at every hit: no heap; only the variant's own part is written"
-)]
 pub enum Bsdf {
     /// Ideally diffuse.
     Lambert(Lambert),
@@ -78,8 +74,8 @@ impl Bsdf {
         match whole {
             whole if letters.contains(own) && !twins => whole,
             // Nothing but diffuse.
-            Self::Lambert(_) => Self::Kept(Kept::new(Mixture::NONE, letters)),
-            _ => Self::Kept(Kept::new(mixture(&s), letters)),
+            Self::Lambert(_) => Self::Kept(Kept::new(&Mixture::NONE, letters)),
+            _ => Self::Kept(Kept::new(&mixture(&s), letters)),
         }
     }
 

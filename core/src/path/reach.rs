@@ -63,6 +63,7 @@ pub struct Unreachable {
 }
 
 /// What of a path matters to techniques; its scatterings are met from the eye on.
+#[expect(clippy::struct_excessive_bools, reason = "what an automaton of few states knows of a word")]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 struct Course {
     /// Any scattering.

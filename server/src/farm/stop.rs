@@ -40,7 +40,14 @@ impl Farm {
                 settlement: Some(settlement.clone()),
             })
         };
-        self.change(&live.id, change).await?;
+        match self.change(&live.id, change).await {
+            // It was purged while its picture was written.
+            Err(FarmError::NotFound { .. }) => {
+                self.forget_live(&live.id);
+                return Ok(self.blobs.delete_all(&BlobFolder::Job(live.id.clone())).await?);
+            }
+            done => done.map(drop)?,
+        }
         self.forget_live(&live.id);
         live.changed();
         tracing::info!(job = %live.id, state = ending.state.name(), reason = ending.reason, "job is over");

@@ -136,8 +136,12 @@ async fn a_method_that_splats_is_never_cut() {
     };
     let path = check(MethodRequest::Path, &[]).await.unwrap();
     assert!(path.schedule().regions().len() > 1);
-    for method in [MethodRequest::Light, MethodRequest::Bidirectional, MethodRequest::Photon] {
-        let spec = check(method, &["direct=LDE"]).await.unwrap();
+    let direct = &["direct=LDE"][..];
+    // Photons bring a layer of their own.
+    let photon = (MethodRequest::Photon, &[][..]);
+    for (method, layers) in [(MethodRequest::Light, direct), (MethodRequest::Bidirectional, direct), photon] {
+        let spec = check(method, layers).await.unwrap();
+        assert_eq!(spec.settings.planes(), 2);
         assert_eq!(spec.schedule().regions(), [spec.region]);
     }
     // Three planes of 3840 × 2000 pixels have 264 MiB.
