@@ -123,13 +123,16 @@ impl Bake {
         };
         let solution = solution.map_err(|e| scene_file::fault(&self.scene, &e))?;
         let report = solution.report();
-        terminal::remark(&format!(
-            "solved: {} patches, {} iterations, residual {:.1e}, {}",
-            report.patches,
-            report.iterations,
-            report.residuals.last().copied().unwrap_or(0.0),
-            words::duration(start.elapsed().as_secs_f64())
-        ));
+        let found = match self.method {
+            MethodName::Radiosity => format!(
+                "{} iterations, residual {:.1e}",
+                report.iterations,
+                report.residuals.last().copied().unwrap_or(0.0)
+            ),
+            MethodName::Light => format!("{} particles", self.particles),
+        };
+        let seconds = words::duration(start.elapsed().as_secs_f64());
+        terminal::remark(&format!("solved: {} patches, {found}, {seconds}", report.patches));
         let form = match self.form {
             FormName::VertexColors => Form::VertexColours,
             FormName::LightMap => Form::LightMap(self.size),
