@@ -265,7 +265,7 @@ fn rays(criterion: &mut Criterion<ThreadTime>) {
                 let on_light =
                     scene.light[0] + scene.light[1] * random.uniform() + scene.light[2] * random.uniform();
                 let origin = p.leave(on_light - p.position);
-                Ray { origin, direction: on_light - origin, t_max: 1.0 }
+                Ray { t_max: 1.0, ..Ray::new(origin, on_light - origin) }
             })
             .collect();
         for (name, rays) in [("primary", &primary), ("bounce", &bounce)] {

@@ -21,6 +21,8 @@ pub enum Dimension {
     Film,
     /// Place on the lens.
     Lens,
+    /// When the shutter lets it in: the first number, as a share of the shutter's time.
+    Time,
     /// At the n-th scattering of the eye subpath, from 0.
     Eye(u32, Use),
     /// At the start of a light subpath.
@@ -72,6 +74,7 @@ impl Dimension {
             Self::Film => 0,
             Self::Lens => 1,
             Self::Start(what) => what as u32,
+            Self::Time => 2,
             Self::Eye(n, what) | Self::Light(n, what) => FIRST_SCATTERING + SCATTERING * n + what as u32,
         }
     }

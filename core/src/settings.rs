@@ -81,6 +81,11 @@ impl Method {
         }
     }
 
+    /// Whether its mean is off the truth by what the spread of samples does not show.
+    pub fn has_bias(self) -> bool {
+        matches!(self, Self::Photon | Self::Radiosity)
+    }
+
     /// Whether a sample of one pixel can add light to any other, so that a batch is always the whole picture.
     pub fn splats(self) -> bool {
         matches!(self, Self::Light | Self::Bidirectional | Self::Photon)

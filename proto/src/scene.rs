@@ -56,6 +56,12 @@ pub struct SceneContents {
     pub camera_aspect_ratios: Vec<Option<f64>>,
     /// Emitters of each kind.
     pub lights: LightCounts,
+    /// Whether each camera's rays are parallel.
+    #[serde(default)]
+    pub camera_rays_parallel: Vec<bool>,
+    /// Letters that its surfaces can have: `D`, `S` (glossy), `S_M`.
+    #[serde(default)]
+    pub letters: Vec<String>,
     /// What a render of it needs.
     pub needs: Vec<String>,
     /// What a render of it leaves out.

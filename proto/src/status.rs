@@ -6,7 +6,7 @@ use crate::{
     job::JobRequest,
 };
 use jiff::Timestamp;
-use ovtigre_core::{film::size::Region, settings::Settings};
+use ovtigre_core::{film::size::Region, path::reach::Unreachable, settings::Settings};
 use serde::{Deserialize, Serialize};
 
 /// Where a job is in its life.
@@ -107,6 +107,9 @@ pub struct JobStatus {
     pub method_reason: String,
     /// The path expression.
     pub paths: String,
+    /// Paths that are asked for and that no technique of the method makes.
+    #[serde(default)]
+    pub unreachable: Vec<Unreachable>,
     /// Its layers in order.
     #[serde(default)]
     pub layers: Vec<LayerStatus>,

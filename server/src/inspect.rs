@@ -34,8 +34,8 @@ fn at_fault(error: &LoadError) -> Fault {
 
 /// In the words of the wire.
 pub fn contents(found: Contents) -> SceneContents {
-    let Contents { report, punctual: [point, spot, directional], aspects, needs, leaves_out, warnings } =
-        found;
+    let [point, spot, directional] = found.punctual;
+    let Contents { report, aspects, parallel, letters, needs, leaves_out, warnings, .. } = found;
     let aspects: Vec<Option<f64>> = aspects.into_iter().map(|a| a.map(f64::from)).collect();
     SceneContents {
         triangles: report.placed_triangles,
@@ -49,6 +49,8 @@ pub fn contents(found: Contents) -> SceneContents {
         aspect_ratio: aspects.first().copied().flatten(),
         camera_aspect_ratios: aspects,
         lights: LightCounts { emissive_triangles: report.emissive_triangles, point, spot, directional },
+        camera_rays_parallel: parallel,
+        letters: letters.iter().map(|letter| letter.symbol().to_owned()).collect(),
         needs,
         leaves_out,
         warnings: warnings

@@ -6,6 +6,7 @@ mod bad_input;
 mod closed_forms;
 mod faults;
 mod methods;
+mod motion;
 mod radiosity;
 mod same_bits;
 mod techniques;

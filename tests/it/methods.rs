@@ -18,7 +18,7 @@ fn add(glb: &mut Glb, material: Value, (positions, triangles): Mesh) {
 }
 
 /// A room of side 2, open towards the camera, with a lamp under its ceiling, and what `contents` puts in.
-fn room(lamp: f32, contents: impl FnOnce(&mut Glb)) -> Vec<u8> {
+fn room<T>(lamp: f32, contents: impl FnOnce(&mut Glb) -> T) -> Vec<u8> {
     let mut glb = Glb::new();
     let at = Vec3::new;
     add(&mut glb, lambert(0.7, 0.0), floor(-1.0, 2.0, 0.0, 0.0));

@@ -26,8 +26,9 @@ use ovtigre_core::{
         progress::Progress,
     },
     sampler::Sampler,
-    scene::{Scene, interaction::Side},
+    scene::{Scene, interaction::Side, view::Views},
     settings::{CameraChoice, Method, Settings, Shadows},
+    trace::moment::Moment,
     trace::ray::Ray,
 };
 use ovtigre_tests::{
@@ -397,7 +398,7 @@ fn patches_are_cut_where_light_varies() {
 /// What a viewer shows that takes base colours, those of vertices included, as light, and leaves out what faces away: the
 /// points of the rays of [`shown`].
 fn unlit(glb: &[u8], settings: &Settings, white: f32, n: u32) -> Vec<Rgb> {
-    let Scene { mut data, environment, view, .. } = open(glb, None, settings).unwrap();
+    let Scene { mut data, environment, .. } = open(glb, None, settings).unwrap();
     let eye = data.cameras[0].position;
     for mesh in &mut data.meshes {
         let faces = |t: &[u32; 3]| {
@@ -407,11 +408,12 @@ fn unlit(glb: &[u8], settings: &Settings, white: f32, n: u32) -> Vec<Rgb> {
         let kept = mesh.triangles.iter().zip(&mesh.materials).filter(|(triangle, _)| faces(triangle));
         (mesh.triangles, mesh.materials) = kept.map(|(triangle, material)| (*triangle, *material)).unzip();
     }
-    let scene = Scene::new(data, environment, view).unwrap();
+    let views = Views::new(&data.cameras[0], settings.size, None);
+    let scene = Scene::new(data, environment, views).unwrap();
     let one = |pixel, k| {
-        let ray = camera_ray(&scene, settings, pixel, &Sampler::new(1, 0, pixel, k));
+        let ray = camera_ray(&scene, settings, pixel, &Sampler::new(1, 0, pixel, k), Moment::STILL);
         let hit = scene.closest(&ray, || 0)?;
-        let at = scene.data.interaction(hit.instance, hit.triangle, hit.barycentric);
+        let at = scene.data.interaction(hit.instance, hit.triangle, hit.barycentric, Moment::STILL);
         Some(at.material.base(&scene.data.textures, &at.at).truncate() * white)
     };
     let pixels = (0..settings.size.height).flat_map(|y| (0..settings.size.width).map(move |x| [x, y]));
@@ -478,7 +480,7 @@ fn a_textured_floor_keeps_its_texture_when_baked() {
     let mut seen = 0;
     for (i, found) in found.iter().enumerate() {
         let pixel = [i as u32 % 24, i as u32 / 24];
-        let ray = camera_ray(&prepared.scene, &settings, pixel, &Sampler::new(1, 0, pixel, 0));
+        let ray = camera_ray(&prepared.scene, &settings, pixel, &Sampler::new(1, 0, pixel, 0), Moment::STILL);
         let Some(hit) = prepared.scene.closest(&ray, || 0) else { continue };
         if prepared.scene.data.node_name(hit.instance, hit.triangle) != "floor" {
             continue;

@@ -53,6 +53,16 @@ impl Glb {
         self.push("accessors", accessor)
     }
 
+    /// Adds an accessor of single floats.
+    pub fn scalars(&mut self, values: &[f32]) -> usize {
+        let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+        let view = self.view(&bytes);
+        self.push(
+            "accessors",
+            json!({"bufferView": view, "componentType": 5126, "count": values.len(), "type": "SCALAR"}),
+        )
+    }
+
     /// Adds an accessor of 32-bit indices.
     pub fn indices(&mut self, indices: &[u32]) -> usize {
         let bytes: Vec<u8> = indices.iter().flat_map(|v| v.to_le_bytes()).collect();
@@ -138,7 +148,7 @@ impl Glb {
     }
 
     /// Adds a punctual light; it shines along −z of the node.
-    pub fn light(&mut self, light: Value, mut node: Value) {
+    pub fn light(&mut self, light: Value, mut node: Value) -> usize {
         let extensions = self.document.entry("extensions").or_insert_with(|| json!({}));
         let lights = &mut extensions["KHR_lights_punctual"]["lights"];
         if lights.is_null() {
@@ -147,7 +157,35 @@ impl Glb {
         let lights = lights.as_array_mut().expect("a list");
         lights.push(light);
         node["extensions"] = json!({"KHR_lights_punctual": {"light": lights.len() - 1}});
-        self.node(node);
+        self.node(node)
+    }
+
+    /// Puts nodes under a new one.
+    pub fn carry(&mut self, nodes: &[usize]) -> usize {
+        self.nodes.retain(|node| !nodes.contains(node));
+        self.node(json!({"children": nodes}))
+    }
+
+    /// Gives the mesh of a node a morph target that moves its vertices, three numbers each.
+    pub fn morph(&mut self, node: usize, moves: &[f32]) {
+        let target = self.floats(moves, 3);
+        let mesh = self.document["nodes"][node]["mesh"].as_u64().expect("the node has a mesh") as usize;
+        self.document["meshes"][mesh]["primitives"][0]["targets"] = json!([{"POSITION": target}]);
+    }
+
+    /// Animates a node's `translation`, `rotation`, `scale` or `weights`: key frames' times, and their values.
+    pub fn animate(&mut self, node: usize, path: &str, interpolation: &str, times: &[f32], values: &[f32]) {
+        let input = self.scalars(times);
+        let output = match path {
+            "weights" => self.scalars(values),
+            "rotation" => self.floats(values, 4),
+            _ => self.floats(values, 3),
+        };
+        self.push(
+            "animations",
+            json!({"samplers": [{"input": input, "output": output, "interpolation": interpolation}],
+                "channels": [{"sampler": 0, "target": {"node": node, "path": path}}]}),
+        );
     }
 
     /// The document so far, to be changed by hand.

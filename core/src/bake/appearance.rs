@@ -7,6 +7,7 @@ use crate::radiosity::reflectance;
 use crate::radiosity::solution::Solution;
 use crate::scene::data::SceneData;
 use crate::scene::material::SurfaceCoordinates;
+use crate::trace::moment::Moment;
 use glam::{Vec2, Vec4};
 
 /// What a point of an element looks like.
@@ -27,7 +28,7 @@ impl Appearance {
     /// Of the point of an element with the given weights of its second and third corner.
     pub fn at(data: &SceneData, solution: &Solution, element: Element, local: Vec2) -> Self {
         let patch = &solution.patches().all()[element.patch().index()];
-        let at = data.interaction(patch.instance, patch.triangle, patch.on_triangle(local));
+        let at = data.interaction(patch.instance, patch.triangle, patch.on_triangle(local), Moment::STILL);
         let arriving = solution.arriving(element, local);
         let mut surface = at.surface();
         let own = reflectance::mean(&Bsdf::from_surface(&surface));

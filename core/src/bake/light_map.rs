@@ -13,6 +13,7 @@ use crate::scene::data::SceneData;
 use crate::scene::instance::Handedness;
 use crate::scene::interaction::Side;
 use crate::scene::material::MaterialId;
+use crate::trace::moment::Moment;
 use glam::{Vec2, Vec3};
 use image::ImageEncoder as _;
 use image::codecs::png::PngEncoder;
@@ -56,7 +57,7 @@ pub fn write(
 ) -> Option<(Vec<usize>, LightMap, f32)> {
     let faces = faces(data, solution);
     let longest = |face: &Face| {
-        let [a, b, c] = data.corners(face.instance, face.triangle);
+        let [a, b, c] = data.corners(face.instance, face.triangle, Moment::STILL);
         f64::from(a.distance(b).max(b.distance(c)).max(c.distance(a)))
     };
     let sizes: Vec<f64> = faces.iter().map(longest).collect();
@@ -67,7 +68,7 @@ pub fn write(
     let mut brightness = Vec::new();
     for (face, texels) in faces.iter().zip(drawn) {
         let emits = data.material(face.instance, face.triangle).emits();
-        let [a, b, c] = data.corners(face.instance, face.triangle);
+        let [a, b, c] = data.corners(face.instance, face.triangle, Moment::STILL);
         let area = f64::from((b - a).cross(c - a).length()) / texels.len() as f64;
         for ([x, y], radiance, alpha) in texels {
             map.texels[y as usize * side as usize + x as usize] = (radiance, alpha);

@@ -29,6 +29,16 @@ impl Letter {
         self as usize
     }
 
+    /// As it is written.
+    pub const fn symbol(self) -> &'static str {
+        match self {
+            Self::Diffuse => "D",
+            Self::Glossy => "S",
+            Self::Specular => "S_M",
+            Self::Mirrored => "S_T",
+        }
+    }
+
     /// Whether its density is a Dirac delta, so that nothing can be connected to it.
     #[inline]
     pub const fn is_delta(self) -> bool {

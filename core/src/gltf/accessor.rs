@@ -14,6 +14,7 @@ pub(crate) struct Source<'a> {
 }
 
 /// Typed elements, checked to lie within their buffers.
+#[derive(Clone)]
 pub(crate) struct Accessor<'a> {
     /// Number of elements.
     pub(crate) count: usize,
@@ -32,6 +33,7 @@ struct Strided<'a> {
     stride: usize,
 }
 
+#[derive(Clone)]
 struct Sparse<'a> {
     indices: Indices<'a>,
     values: Strided<'a>,
@@ -40,6 +42,7 @@ struct Sparse<'a> {
 /// Which elements a sparse accessor replaces, left where they are: reading them for every primitive that
 /// shares an accessor would cost more than the file is long. They should rise strictly; where they do not,
 /// some are not found, and the survey says so.
+#[derive(Clone)]
 struct Indices<'a> {
     component: Component,
     raw: Strided<'a>,
@@ -247,6 +250,11 @@ impl Accessor<'_> {
             return Some(&sparse.values.bytes[at * sparse.values.stride..]);
         }
         self.dense.map(|dense| &dense.bytes[index * dense.stride..])
+    }
+
+    /// Whether integers stand for shares of one.
+    pub(crate) fn is_normalised(&self) -> bool {
+        self.normalised
     }
 
     /// How many elements are replaced.

@@ -2,29 +2,38 @@
 
 use crate::gltf::document::{At, Document};
 use crate::gltf::error::{LoadError, Problems};
-use crate::gltf::nodes::Tree;
-use crate::scene::camera::{Camera, Projection};
+use crate::gltf::stage::Stage;
+use crate::scene::camera::{Camera, Projection, Stand};
 use crate::scene::normalisation::Normalisation;
 
-/// The cameras of the scene's nodes, in the scene's space.
+/// The cameras of the scene's nodes, in the scene's space. The size of an orthographic one is that at the first knot.
 pub(crate) fn read(
     document: &Document,
-    tree: &Tree<'_>,
+    stage: &Stage<'_>,
     normalisation: &Normalisation,
     problems: &mut Problems,
 ) -> Result<Vec<Camera>, LoadError> {
     let mut cameras = Vec::new();
-    for node in &tree.nodes {
+    for (place, node) in stage.tree.nodes.iter().enumerate() {
         let Some(index) = node.at.index("camera", "cameras", document.count("cameras"))? else {
             continue;
         };
         let item = document.item("cameras", index)?;
         let projection = projection(&item)?;
         let name = if node.name.is_empty() { item.name() } else { node.name.clone() };
-        match Camera::placed(name, &normalisation.apply(&node.world), projection) {
-            Some(camera) => cameras.push(camera),
-            None => problems.add(&node.at.pointer, "its transform flattens space: the camera is left out"),
+        let placed = (stage.worlds(place))
+            .map(|world| Camera::placed(name.clone(), &normalisation.apply(&world), projection))
+            .collect::<Option<Vec<_>>>();
+        let Some(mut placed) = placed else {
+            problems.add(&node.at.pointer, "its transform flattens space: the camera is left out");
+            continue;
+        };
+        let stands: Vec<Stand> = placed.iter().map(Camera::stand).collect();
+        let mut camera = placed.swap_remove(0);
+        if stands.len() > 1 {
+            camera.knots = stands;
         }
+        cameras.push(camera);
     }
     Ok(cameras)
 }

@@ -3,11 +3,13 @@
 use crate::gltf::accessor::{Accessor, Component, Source};
 use crate::gltf::document::At;
 use crate::gltf::error::{LoadError, Problems};
+use crate::gltf::shapes::Morphs;
 use crate::gltf::skin::Influences;
 use crate::gltf::textures::UvSets;
 use crate::gltf::topology::Mode;
 use crate::gltf::{skin, tangents};
 use crate::scene::bounds::Bounds;
+use crate::scene::mesh::Form;
 use glam::{Vec2, Vec3, Vec4};
 
 /// Triangles of one material. Attributes that are absent or not needed are empty lists.
@@ -24,6 +26,12 @@ pub(crate) struct Geometry {
     pub(crate) material: Option<usize>,
     /// Triangles without area that were left out.
     pub(crate) degenerate: u64,
+    /// Its number among the mesh's primitives.
+    pub(crate) primitive: usize,
+    /// Where its vertices are in the primitive's accessors; empty unless it morphs.
+    pub(crate) vertices: Vec<u32>,
+    /// What it has morphed to at the second knot and all further ones; empty unless it morphs.
+    pub(crate) forms: Vec<Form>,
 }
 
 /// What a primitive's material asks of its geometry.
@@ -33,6 +41,27 @@ pub(crate) struct Wanted {
     /// The list of coordinates that a normal map is laid out by.
     pub(crate) normal_map: Option<usize>,
     pub(crate) influences: skin::Wanted,
+    pub(crate) morphs: Morphs,
+}
+
+/// The vertices `vertices` of a primitive (as its accessors count them), morphed by `weights`. Tangents are empty where
+/// the primitive has none.
+pub(crate) fn morphed<'a>(
+    at: &'a At<'a>,
+    source: Source<'a>,
+    vertices: &[u32],
+    weights: &[f64],
+) -> Result<Form, LoadError> {
+    let attributes = at.object("attributes")?.ok_or_else(|| at.error("\"attributes\" is missing"))?;
+    let position = accessor(source, &attributes, "POSITION")?;
+    let position = position.ok_or_else(|| attributes.error("\"POSITION\" is missing"))?;
+    let (used, targets) = (vertices.to_vec(), morph_targets(at, weights)?);
+    let primitive = Primitive { at, attributes, source, vertices: position.count, used, targets };
+    Ok(Form {
+        positions: primitive.positions(&position)?,
+        normals: primitive.normals(&mut Problems::default())?,
+        tangents: primitive.tangents()?,
+    })
 }
 
 /// The accessors of a primitive, looked up but not read.
@@ -78,7 +107,11 @@ pub(crate) fn read<'a>(
     if wanted.influences == skin::Wanted::Yes {
         geometry.influences = primitive.influences()?;
     }
-    geometry.drop_degenerate();
+    match wanted.morphs {
+        // What has no area now may have one later.
+        Morphs::Yes => geometry.vertices.clone_from(&primitive.used),
+        Morphs::No => geometry.drop_degenerate(),
+    }
     if let Some(set) = wanted.normal_map {
         geometry.tangents = primitive.tangents()?;
         let usable = !geometry.normals.is_empty() && geometry.tangents.len() == geometry.positions.len();
@@ -313,13 +346,14 @@ impl<'a> Primitive<'a> {
         let Some(accessor) = self.attribute(&self.attributes, "TANGENT", &[4])? else {
             return Ok(Vec::new());
         };
-        let tangent = |&v: &u32| {
-            let read = Vec4::from(accessor.get::<4>(v as usize));
-            let direction = read.truncate();
+        let read: Vec<Vec4> = self.used.iter().map(|&v| Vec4::from(accessor.get::<4>(v as usize))).collect();
+        let mut directions: Vec<Vec3> = read.iter().map(|t| t.truncate()).collect();
+        self.morph("TANGENT", &mut directions)?;
+        let tangent = |(direction, read): (Vec3, &Vec4)| {
             let unit = if direction.is_finite() { direction.normalize_or_zero() } else { Vec3::ZERO };
             unit.extend(if read.w < 0.0 { -1.0 } else { 1.0 })
         };
-        Ok(self.used.iter().map(tangent).collect())
+        Ok(directions.into_iter().zip(&read).map(tangent).collect())
     }
 
     fn uvs(&self, number: u64, problems: &mut Problems) -> Result<Vec<Vec2>, LoadError> {
@@ -406,6 +440,7 @@ impl Geometry {
         keep(&mut self.uvs[0], &used);
         keep(&mut self.uvs[1], &used);
         keep(&mut self.colours, &used);
+        keep(&mut self.vertices, &used);
         if let Some(influences) = &mut self.influences {
             influences.keep(&used);
         }
@@ -420,6 +455,7 @@ impl Geometry {
         again(&mut self.uvs[0], vertex);
         again(&mut self.uvs[1], vertex);
         again(&mut self.colours, vertex);
+        again(&mut self.vertices, vertex);
         if let Some(influences) = &mut self.influences {
             influences.duplicate(vertex);
         }

@@ -2,11 +2,12 @@
 
 use crate::gltf::document::{At, Document};
 use crate::gltf::error::{LoadError, Problems};
-use crate::gltf::nodes::{Node, Tree};
+use crate::gltf::nodes::Node;
+use crate::gltf::stage::Stage;
 use crate::math::colour::Rgb;
 use crate::scene::normalisation::Normalisation;
 use crate::scene::punctual::{Punctual, PunctualKind};
-use glam::{DVec3, Vec3};
+use glam::{DAffine3, DVec3, Vec3};
 
 const NAME: &str = "KHR_lights_punctual";
 
@@ -14,7 +15,7 @@ const NAME: &str = "KHR_lights_punctual";
 /// a hint for other kinds of renderer and is not used.
 pub(crate) fn read(
     document: &Document,
-    tree: &Tree<'_>,
+    stage: &Stage<'_>,
     normalisation: &Normalisation,
     problems: &mut Problems,
 ) -> Result<Vec<Punctual>, LoadError> {
@@ -23,24 +24,45 @@ pub(crate) fn read(
         None => Vec::new(),
     };
     let mut lights = Vec::new();
-    for node in &tree.nodes {
+    for (place, node) in stage.tree.nodes.iter().enumerate() {
         let Some(at) = node.at.extension(NAME)? else {
             continue;
         };
         let index = at.need("light")?.as_index("lights", list.len())?;
         let item = &list[index];
-        let Some(kind) = kind(item, node, normalisation, problems)? else {
+        let mut knots = Vec::new();
+        for world in stage.worlds(place) {
+            knots.push(stand(node, &world, normalisation)?);
+        }
+        let Some(kind) = kind(item, node, knots[0], normalisation, problems)? else {
             continue;
         };
+        if knots.len() == 1 {
+            knots.clear();
+        }
         let name = if node.name.is_empty() { item.name() } else { node.name.clone() };
-        lights.push(Punctual { name, kind });
+        lights.push(Punctual { name, kind, knots });
     }
     Ok(lights)
+}
+
+/// Where a light is and which way it shines.
+fn stand(
+    node: &Node<'_>,
+    world: &DAffine3,
+    normalisation: &Normalisation,
+) -> Result<(Vec3, Vec3), LoadError> {
+    let position = normalisation.point(world.translation);
+    if !position.is_finite() {
+        return Err(node.at.error("the light is too far away for the range of numbers"));
+    }
+    Ok((position, (world.matrix3 * DVec3::NEG_Z).normalize_or_zero().as_vec3()))
 }
 
 fn kind(
     item: &At<'_>,
     node: &Node<'_>,
+    (position, direction): (Vec3, Vec3),
     normalisation: &Normalisation,
     problems: &mut Problems,
 ) -> Result<Option<PunctualKind>, LoadError> {
@@ -59,11 +81,6 @@ fn kind(
             Err(item.error("\"intensity\" exceeds the range of numbers"))
         }
     };
-    let position = normalisation.point(node.world.translation);
-    if !position.is_finite() {
-        return Err(node.at.error("the light is too far away for the range of numbers"));
-    }
-    let direction = (node.world.matrix3 * DVec3::NEG_Z).normalize_or_zero().as_vec3();
     let kind = match item.text("type")? {
         Some("point") => PunctualKind::Point { position, intensity: finite(power * scale * scale)? },
         Some("spot") => {

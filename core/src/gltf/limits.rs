@@ -18,6 +18,8 @@ pub struct Limits {
     pub picture_pixels: u64,
     /// Pixels along a side of one picture.
     pub picture_side: u32,
+    /// Vertices of morph targets with a weight, each target of each mesh counted at each form it takes.
+    pub morphed_vertices: u64,
     /// Elements of an accessor that no buffer backs.
     pub unbacked_elements: u64,
 }
@@ -32,6 +34,7 @@ impl Default for Limits {
             instances: 10_000_000,
             picture_pixels: 1 << 28,
             picture_side: 16_384,
+            morphed_vertices: 1 << 31,
             unbacked_elements: 1 << 22,
         }
     }

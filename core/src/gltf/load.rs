@@ -1,16 +1,19 @@
 //! A bundle to a scene.
 
 use crate::gltf::accessor::Source;
-use crate::gltf::assemble::{Assembled, MaterialIds, assemble};
+use crate::gltf::animation::{self, Animation};
+use crate::gltf::assemble::{Assembled, assemble};
 use crate::gltf::buffers::Buffers;
 use crate::gltf::bundle::Bundle;
 use crate::gltf::document::Document;
 use crate::gltf::error::{LoadError, Problem, Problems};
+use crate::gltf::gather::MaterialIds;
 use crate::gltf::limits::Limits;
-use crate::gltf::report::{Dropped, Report};
+use crate::gltf::nodes::Tree;
+use crate::gltf::report::{Animated, Dropped, Report};
 use crate::gltf::shapes::{Materials, Shape};
 use crate::gltf::textures::TextureTable;
-use crate::gltf::{cameras, extensions, lights, materials, nodes, pictures, shapes, survey};
+use crate::gltf::{cameras, extensions, knots, lights, materials, nodes, pictures, shapes, survey};
 use crate::scene::data::SceneData;
 use crate::scene::material::{Coverage, Material, MaterialId};
 use crate::scene::texture::Texture;
@@ -29,7 +32,14 @@ pub struct Loaded {
 
 /// Reads a scene: glTF 2.0 with the extensions that [`Bundle`]'s document may require. The result depends on
 /// nothing but the bytes and the limits.
+/// The scene is as its animations have it at 0 s.
 pub fn load(bundle: &Bundle, limits: &Limits) -> Result<Loaded, LoadError> {
+    load_while(bundle, limits, [0.0; 2])
+}
+
+/// Reads a scene as [`load`] does, as it moves while a shutter is open from the first to the second of `times`, in
+/// seconds. All animations of the file play together. Where both times are the same, nothing moves.
+pub fn load_while(bundle: &Bundle, limits: &Limits, times: [f64; 2]) -> Result<Loaded, LoadError> {
     let parts = bundle.parts()?;
     let document = Document::parse(bundle.name(), &parts.json, limits)?;
     let mut problems = Problems::default();
@@ -41,32 +51,37 @@ pub fn load(bundle: &Bundle, limits: &Limits) -> Result<Loaded, LoadError> {
     let buffers = Buffers::read(bundle, &document, parts.binary, limits)?;
     let source = Source { document: &document, buffers: &buffers, limits };
 
-    let tree = nodes::read(&document, &mut problems)?;
+    let animation = animation::read(source, &mut problems)?;
+    let tree = nodes::read(&document, &animation, times, &mut problems)?;
     let (mut table, mut dropped) = (TextureTable::default(), Dropped::default());
-    let mut shapes = shapes::find(source, &tree)?;
-    let read = shapes::read(source, &mut shapes, &mut table, &mut dropped, &mut problems)?;
+    let (mut shapes, skins) = shapes::find(source, &tree, &animation, times)?;
+    let read = shapes::read(source, &mut shapes, &skins, &mut table, &mut dropped, &mut problems)?;
+    let stage = knots::stage(source, &tree, &animation, &shapes, &skins, times, &mut problems)?;
+    stage.morph(source, &animation, &mut shapes)?;
+    let animated = count_animated(&animation, &tree, &shapes);
     let (meshes, instances) = count_uses(&shapes);
     let pictures = pictures::read(bundle, source, &table.images(), &mut problems)?;
     survey::survey(bundle, source, &table.images(), &mut problems);
     let textures = table.finish(&pictures);
     let (materials, ids) = number_materials(&document, read, &shapes, &textures)?;
     let Assembled { meshes: lists, instances: placed, bounds, normalisation } =
-        assemble(&document, &tree, shapes, &ids, &mut dropped, &mut problems)?;
+        assemble(&document, &stage, shapes, &ids, &mut dropped, &mut problems)?;
     let mut scene = SceneData {
         meshes: lists,
         instances: placed,
         materials,
         textures,
-        cameras: cameras::read(&document, &tree, &normalisation, &mut problems)?,
-        punctual: lights::read(&document, &tree, &normalisation, &mut problems)?,
+        cameras: cameras::read(&document, &stage, &normalisation, &mut problems)?,
+        punctual: lights::read(&document, &stage, &normalisation, &mut problems)?,
         bounds,
         normalisation,
+        knots: stage.knots.clone(),
     };
     let metres = normalisation.metres(1.0);
     for volume in scene.materials.iter_mut().filter_map(|m| m.volume.as_mut()) {
         volume.absorption = (volume.absorption.as_dvec3() * metres).as_vec3();
     }
-    let report = Report::of(&scene, meshes, instances, dropped);
+    let report = Report { animated, ..Report::of(&scene, meshes, instances, dropped) };
     point_out_what_is_missing(&scene, &report, &mut problems);
     Ok(Loaded { scene, warnings: problems.finish(), report })
 }
@@ -104,6 +119,17 @@ fn count_uses(shapes: &[Shape]) -> (u64, u64) {
     meshes.dedup();
     let places = shapes.iter().filter(|s| !s.is_empty()).map(|s| s.places.len() as u64).sum();
     (meshes.len() as u64, places)
+}
+
+/// What of a scene can move.
+fn count_animated(animation: &Animation<'_>, tree: &Tree<'_>, shapes: &[Shape]) -> Animated {
+    let driven = |node: &&nodes::Node<'_>| animation.channels(node.index).is_some();
+    let count = |of: fn(&&Shape) -> bool| shapes.iter().filter(|s| !s.is_empty()).filter(of).count() as u64;
+    Animated {
+        nodes: tree.nodes.iter().filter(driven).count() as u64,
+        skins: count(|shape| shape.skin.is_some()),
+        morphs: count(|shape| !shape.weights.is_empty()),
+    }
 }
 
 /// Materials that triangles have, in the order of the document, the default one first.

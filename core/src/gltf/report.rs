@@ -28,10 +28,23 @@ pub struct Report {
     pub cameras: u64,
     /// Names of the cameras, in order.
     pub camera_names: Vec<String>,
+    /// What can move.
+    pub animated: Animated,
     /// What was left out.
     pub dropped: Dropped,
     /// Memory of geometry and pictures, in bytes.
     pub bytes: u64,
+}
+
+/// What of a scene can move, whether it does while the shutter is open or not.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Animated {
+    /// Nodes that animations drive.
+    pub nodes: u64,
+    /// Meshes that a skin bends.
+    pub skins: u64,
+    /// Meshes with morph weights.
+    pub morphs: u64,
 }
 
 /// What of a file no light can meet.
@@ -69,6 +82,7 @@ impl Report {
             punctual_lights: scene.punctual.len() as u64,
             cameras: scene.cameras.len() as u64,
             camera_names: scene.cameras.iter().map(|c| c.name.clone()).collect(),
+            animated: Animated::default(),
             dropped,
             bytes: geometry as u64 + pictures.iter().map(|p| p.bytes() as u64).sum::<u64>(),
         }

@@ -1,17 +1,20 @@
 //! Which meshes the scene uses, where, and their geometry.
 
 use crate::gltf::accessor::Source;
+use crate::gltf::animation::Animation;
+use crate::gltf::curve::Side;
+use crate::gltf::document::At;
 use crate::gltf::error::{LoadError, Problems};
 use crate::gltf::geometry::{self, Geometry, Wanted};
 use crate::gltf::materials;
 use crate::gltf::nodes::Tree;
 use crate::gltf::report::Dropped;
-use crate::gltf::skin;
+use crate::gltf::skin::{self, Skin};
 use crate::gltf::textures::{TextureTable, UvSets};
 use crate::gltf::topology::Mode;
 use crate::scene::bounds::Bounds;
-use glam::DAffine3;
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 
 /// A mesh in one form: with its skin and weights.
 pub(crate) struct Shape {
@@ -19,23 +22,40 @@ pub(crate) struct Shape {
     pub(crate) name: String,
     /// Index of the mesh in the document.
     pub(crate) mesh: usize,
-    weights: Vec<f64>,
-    skin: Option<usize>,
-    /// Mesh to file for each joint, if it has a skin.
-    pub(crate) joints: Vec<DAffine3>,
+    /// Of its morph targets, when the shutter opens.
+    pub(crate) weights: Vec<f64>,
+    /// Whether its weights change while the shutter is open.
+    pub(crate) morphs: Morphs,
+    /// Index of its skin in the document.
+    pub(crate) skin: Option<usize>,
     pub(crate) geometries: Vec<Geometry>,
-    /// Where it stands: indices into the tree's nodes. One at most where it has a skin.
+    /// Where it stands: indices into the tree's nodes. One where it has a skin or weights of its own.
     pub(crate) places: Vec<usize>,
 }
+
+/// Whether morph weights change while the shutter is open.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Morphs {
+    Yes,
+    No,
+}
+
+/// The skins that shapes have, by their index in the document.
+pub(crate) type Skins = BTreeMap<usize, Skin>;
 
 /// The materials of all shapes, by their index in the document.
 pub(crate) type Materials = BTreeMap<Option<usize>, materials::Read>;
 
 /// Finds the meshes that nodes of the tree have. Nodes share a shape if they have the same mesh, no skin, and
 /// the same morph weights.
-pub(crate) fn find(source: Source<'_>, tree: &Tree<'_>) -> Result<Vec<Shape>, LoadError> {
+pub(crate) fn find(
+    source: Source<'_>,
+    tree: &Tree<'_>,
+    animation: &Animation<'_>,
+    times: [f64; 2],
+) -> Result<(Vec<Shape>, Skins), LoadError> {
     let document = source.document;
-    let mut shapes: Vec<Shape> = Vec::new();
+    let (mut shapes, mut skins): (Vec<Shape>, Skins) = (Vec::new(), Skins::new());
     let mut plain: BTreeMap<usize, usize> = BTreeMap::new();
     let mut places = 0_u64;
     for (place, node) in tree.nodes.iter().enumerate() {
@@ -54,7 +74,13 @@ pub(crate) fn find(source: Source<'_>, tree: &Tree<'_>) -> Result<Vec<Shape>, Lo
         }
         let item = document.item("meshes", mesh)?;
         let skin = node.at.index("skin", "skins", document.count("skins"))?;
-        let own = weights(&node.at)?;
+        let curve = animation.channels(node.index).and_then(|channels| channels.weights.as_ref());
+        let own = match curve {
+            Some(curve) => Some(curve.weights(times[0], Side::After)),
+            None => weights(&node.at)?,
+        };
+        let still = curve.is_none_or(|curve| curve.is_still(times[0], times[1]));
+        let morphs = if still { Morphs::No } else { Morphs::Yes };
         if skin.is_none()
             && own.is_none()
             && let Some(&known) = plain.get(&mesh)
@@ -69,23 +95,26 @@ pub(crate) fn find(source: Source<'_>, tree: &Tree<'_>) -> Result<Vec<Shape>, Lo
             Some(weights) => weights,
             None => weights_or_none(&item)?,
         };
-        let joints = skin.map(|skin| skin::joints(source, tree, skin)).transpose()?.unwrap_or_default();
+        if let Some(index) = skin
+            && let Entry::Vacant(new) = skins.entry(index)
+        {
+            new.insert(skin::read(source, tree, index)?);
+        }
         let (name, geometries) = (item.name(), Vec::new());
-        shapes.push(Shape { name, mesh, weights, skin, joints, geometries, places: vec![place] });
+        shapes.push(Shape { name, mesh, weights, morphs, skin, geometries, places: vec![place] });
     }
-    Ok(shapes)
+    Ok((shapes, skins))
 }
 
-fn weights(at: &crate::gltf::document::At<'_>) -> Result<Option<Vec<f64>>, LoadError> {
+fn weights(at: &At<'_>) -> Result<Option<Vec<f64>>, LoadError> {
     if at.get("weights").is_none() {
         return Ok(None);
     }
-    let number =
-        |w: &crate::gltf::document::At<'_>| w.value.as_f64().ok_or_else(|| w.error("should be a number"));
+    let number = |w: &At<'_>| w.value.as_f64().ok_or_else(|| w.error("should be a number"));
     at.elements("weights")?.iter().map(number).collect::<Result<_, _>>().map(Some)
 }
 
-fn weights_or_none(at: &crate::gltf::document::At<'_>) -> Result<Vec<f64>, LoadError> {
+fn weights_or_none(at: &At<'_>) -> Result<Vec<f64>, LoadError> {
     Ok(weights(at)?.unwrap_or_default())
 }
 
@@ -93,6 +122,7 @@ fn weights_or_none(at: &crate::gltf::document::At<'_>) -> Result<Vec<f64>, LoadE
 pub(crate) fn read(
     source: Source<'_>,
     shapes: &mut [Shape],
+    skins: &Skins,
     table: &mut TextureTable,
     dropped: &mut Dropped,
     problems: &mut Problems,
@@ -105,7 +135,7 @@ pub(crate) fn read(
         if primitives.is_empty() {
             problems.add(&item.pointer, "has no primitives");
         }
-        for primitive in &primitives {
+        for (number, primitive) in primitives.iter().enumerate() {
             let (mode, _) = geometry::promised(primitive, source)?;
             if mode == Mode::NoSurface {
                 dropped.lines_and_points += 1;
@@ -114,17 +144,18 @@ pub(crate) fn read(
             }
             let index = primitive.index("material", "materials", source.document.count("materials"))?;
             let material = match read.entry(index) {
-                std::collections::btree_map::Entry::Occupied(known) => known.into_mut(),
-                std::collections::btree_map::Entry::Vacant(new) => {
-                    new.insert(materials::read(source.document, index, table, problems)?)
-                }
+                Entry::Occupied(known) => known.into_mut(),
+                Entry::Vacant(new) => new.insert(materials::read(source.document, index, table, problems)?),
             };
             let wanted = wanted(material, shape);
-            let Some(geometry) = geometry::read(primitive, source, wanted, &shape.weights, problems)? else {
+            let Some(mut geometry) = geometry::read(primitive, source, wanted, &shape.weights, problems)?
+            else {
                 continue;
             };
+            geometry.primitive = number;
             dropped.degenerate_triangles += geometry.degenerate;
-            check_joints(&geometry, shape, &primitive.pointer, source)?;
+            let joints = shape.skin.map(|skin| skins[&skin].len());
+            check_joints(&geometry, joints, &primitive.pointer, source)?;
             point_out_thin_glass(&geometry, material, problems);
             shape.geometries.push(geometry);
         }
@@ -142,23 +173,24 @@ fn wanted(read: &materials::Read, shape: &Shape) -> Wanted {
     }
     let normal_map = material.normal.map(|(slot, _)| slot.set as usize);
     let influences = if shape.skin.is_some() { skin::Wanted::Yes } else { skin::Wanted::No };
-    Wanted { sets, normal_map, influences }
+    Wanted { sets, normal_map, influences, morphs: shape.morphs }
 }
 
-/// Counts triangles before any is read.
+/// Counts triangles and vertices to morph before any is read.
 fn check_promised(source: Source<'_>, shapes: &[Shape]) -> Result<(), LoadError> {
-    let mut total = 0_u64;
+    let (mut total, mut morphed) = (0_u64, 0_u64);
     for shape in shapes {
         for primitive in source.document.item("meshes", shape.mesh)?.items("primitives")? {
             total = total.saturating_add(geometry::promised(&primitive, source)?.1);
-            if total > source.limits.triangles {
-                return Err(LoadError::Limit {
-                    file: source.document.file().to_owned(),
-                    pointer: primitive.pointer,
-                    what: "triangles",
-                    found: total,
-                    limit: source.limits.triangles,
-                });
+            morphed = morphed.saturating_add(shape.morphed_vertices(&primitive, source)?);
+            for (what, found, limit) in [
+                ("triangles", total, source.limits.triangles),
+                ("vertices of morph targets", morphed, source.limits.morphed_vertices),
+            ] {
+                if found > limit {
+                    let (file, pointer) = (source.document.file().to_owned(), primitive.pointer);
+                    return Err(LoadError::Limit { file, pointer, what, found, limit });
+                }
             }
         }
     }
@@ -167,15 +199,14 @@ fn check_promised(source: Source<'_>, shapes: &[Shape]) -> Result<(), LoadError>
 
 fn check_joints(
     geometry: &Geometry,
-    shape: &Shape,
+    joints: Option<usize>,
     pointer: &str,
     source: Source<'_>,
 ) -> Result<(), LoadError> {
     let greatest = geometry.influences.as_ref().map_or(0, skin::Influences::greatest);
-    if shape.skin.is_none() || greatest < shape.joints.len() {
+    let Some(joints) = joints.filter(|joints| greatest >= *joints) else {
         return Ok(());
-    }
-    let joints = shape.joints.len();
+    };
     Err(source
         .document
         .error(pointer, format!("a vertex hangs on joint {greatest}, but its skin has only {joints}")))
@@ -199,34 +230,26 @@ impl Shape {
         self.geometries.iter().all(|g| g.triangles.is_empty())
     }
 
-    /// A box around it at a place, in the file's space.
-    pub(crate) fn bounds_at(&self, world: &DAffine3, exact: Exact) -> Bounds {
-        let mut bounds = Bounds::EMPTY;
-        for geometry in &self.geometries {
-            if exact == Exact::No {
-                bounds = bounds.union(geometry.bounds().transformed(world));
-                continue;
-            }
-            for (v, p) in geometry.positions.iter().enumerate() {
-                let transform = self.transform(geometry, v, world);
-                bounds.include(transform.transform_point3(p.as_dvec3()));
-            }
-        }
-        bounds
+    /// Vertices that a primitive's morph targets move, each target counted, to give it one form.
+    pub(crate) fn morphed_vertices(&self, primitive: &At<'_>, source: Source<'_>) -> Result<u64, LoadError> {
+        let targets = primitive.elements("targets")?.len();
+        let weighted = match self.morphs {
+            Morphs::Yes => targets,
+            Morphs::No => self.weights.iter().take(targets).filter(|w| **w != 0.0).count(),
+        };
+        let accessors = source.document.count("accessors");
+        let vertices =
+            match primitive.object("attributes")?.map(|a| a.index("POSITION", "accessors", accessors)) {
+                Some(index) if weighted > 0 => {
+                    index?.map_or(Ok(0), |index| source.accessor(index).map(|a| a.count))?
+                }
+                _ => 0,
+            };
+        Ok(weighted as u64 * vertices as u64)
     }
 
-    /// Mesh to file of one vertex at a place: a skin's vertices go by their joints alone.
-    pub(crate) fn transform(&self, geometry: &Geometry, vertex: usize, world: &DAffine3) -> DAffine3 {
-        match &geometry.influences {
-            Some(influences) if self.skin.is_some() => influences.transform(vertex, &self.joints),
-            _ => *world,
-        }
+    /// A box around it, in the mesh's space.
+    pub(crate) fn bounds(&self) -> Bounds {
+        self.geometries.iter().map(Geometry::bounds).fold(Bounds::EMPTY, Bounds::union)
     }
-}
-
-/// Whether a box is drawn around every vertex or around a box.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Exact {
-    Yes,
-    No,
 }

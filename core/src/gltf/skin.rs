@@ -1,8 +1,8 @@
-//! Skins in their rest pose.
+//! Skins: joints, and what of each vertex hangs on them.
 
 use crate::gltf::accessor::{Accessor, Source};
 use crate::gltf::error::LoadError;
-use crate::gltf::nodes::Tree;
+use crate::gltf::nodes::{Pose, Tree};
 use glam::{DAffine3, DMat3, DMat4};
 
 /// Sets of four joints that a vertex may have.
@@ -82,8 +82,15 @@ impl Influences {
     }
 }
 
-/// Mesh to file for each joint of a skin, at rest.
-pub(crate) fn joints(source: Source<'_>, tree: &Tree<'_>, index: usize) -> Result<Vec<DAffine3>, LoadError> {
+/// A skin: the nodes that bend it, and the transform of the mesh into the space of each.
+pub(crate) struct Skin {
+    /// Places among the tree's nodes.
+    joints: Vec<usize>,
+    binds: Vec<DAffine3>,
+}
+
+/// Reads a skin.
+pub(crate) fn read(source: Source<'_>, tree: &Tree<'_>, index: usize) -> Result<Skin, LoadError> {
     let item = source.document.item("skins", index)?;
     let list = item.elements("joints")?;
     if list.is_empty() {
@@ -100,11 +107,11 @@ pub(crate) fn joints(source: Source<'_>, tree: &Tree<'_>, index: usize) -> Resul
         }
         None => None,
     };
-    let mut joints = Vec::with_capacity(list.len());
+    let mut skin = Skin { joints: Vec::with_capacity(list.len()), binds: Vec::with_capacity(list.len()) };
     for (i, at) in list.iter().enumerate() {
-        let node = at.as_index("nodes", tree.world.len())?;
-        let world = tree.world[node].ok_or_else(|| at.error("the joint is not part of the scene"))?;
-        let bind = match &inverse {
+        let node = at.as_index("nodes", tree.places.len())?;
+        skin.joints.push(tree.places[node].ok_or_else(|| at.error("the joint is not part of the scene"))?);
+        skin.binds.push(match &inverse {
             Some(matrices) => {
                 let m = DMat4::from_cols_array(&matrices.get::<16>(i).map(f64::from));
                 if !m.is_finite() {
@@ -113,8 +120,24 @@ pub(crate) fn joints(source: Source<'_>, tree: &Tree<'_>, index: usize) -> Resul
                 DAffine3::from_mat4(m)
             }
             None => DAffine3::IDENTITY,
-        };
-        joints.push(world * bind);
+        });
     }
-    Ok(joints)
+    Ok(skin)
+}
+
+impl Skin {
+    /// Number of joints.
+    pub(crate) fn len(&self) -> usize {
+        self.joints.len()
+    }
+
+    /// Whether a joint moves while the shutter is open.
+    pub(crate) fn moves(&self, tree: &Tree<'_>) -> bool {
+        self.joints.iter().any(|&place| tree.moves(place))
+    }
+
+    /// Mesh to file for each joint in a pose.
+    pub(crate) fn joints(&self, tree: &Tree<'_>, pose: &Pose) -> Vec<DAffine3> {
+        self.joints.iter().zip(&self.binds).map(|(&place, bind)| tree.world(place, pose) * *bind).collect()
+    }
 }

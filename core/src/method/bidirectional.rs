@@ -17,6 +17,6 @@ pub fn sample<C: Carriage>(
     [eye, light]: [&Sampler; 2],
     tally: &mut Tally,
 ) {
-    let vertices = from_light::<C>(scene, rules, light, Keeps::Vertices, tally);
+    let vertices = from_light::<C>(scene, rules, (light, ray.moment), Keeps::Vertices, tally);
     from_eye::<C>(scene, rules, eye, ray).run(&mut Joined::<C> { light: &vertices }, tally);
 }

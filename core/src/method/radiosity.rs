@@ -12,6 +12,7 @@ use crate::sampler::{Dimension, Sampler, Use};
 use crate::scene::Scene;
 use crate::scene::interaction::{Interaction, Side};
 use crate::settings::Settings;
+use crate::trace::moment::Moment;
 use glam::Vec3;
 
 /// How the solution becomes a picture.
@@ -44,12 +45,12 @@ pub fn sample(
     sampler: &Sampler,
     rays: &mut u64,
 ) -> Rgb {
-    let ray = camera_ray(scene, settings, pixel, sampler);
+    let ray = camera_ray(scene, settings, pixel, sampler, Moment::STILL);
     *rays += 1;
     let Some(hit) = scene.closest(&ray, || sampler.key(Dimension::Eye(0, Use::Alpha))) else {
         return scene.environment.as_ref().map_or(Rgb::ZERO, |e| e.radiance(ray.direction));
     };
-    let at = scene.data.interaction(hit.instance, hit.triangle, hit.barycentric);
+    let at = scene.data.interaction(hit.instance, hit.triangle, hit.barycentric, Moment::STILL);
     let back = -ray.direction;
     let side = at.side(back);
     let emission = if at.material.emits() { at.emission(side) } else { Rgb::ZERO };

@@ -90,7 +90,8 @@ pub fn from_eye<'a, C: Carriage>(
     sampler: &'a Sampler,
     ray: Ray,
 ) -> Walk<'a, EyeState, C::Eye> {
-    let (pdf, kind) = match scene.view.ray_pdf(ray.direction) {
+    let view = scene.view(ray.moment);
+    let (pdf, kind) = match view.ray_pdf(ray.direction) {
         Importance::SolidAngle(pdf) => (pdf, EdgeKind::Directions),
         Importance::Area(pdf) => (pdf, EdgeKind::Parallel),
     };
@@ -100,7 +101,7 @@ pub fn from_eye<'a, C: Carriage>(
         _ => 0.0,
     };
     let carried = C::Eye::in_state(rules.language.eye_start(), Vec3::ONE);
-    let cos = f64::from(scene.view.axis().dot(ray.direction).abs());
+    let cos = f64::from(view.axis().dot(ray.direction).abs());
     let density = Density::SolidAngle(pdf as f32);
     let edge = Edge { ray, from: ray.origin, cos, density, kind };
     let partial = Partial { near, far: 0.0 };

@@ -17,6 +17,7 @@ use crate::sampler::{Dimension, Sampler, StartUse};
 use crate::scene::Scene;
 use crate::scene::emission::{Origin, Place};
 use crate::scene::interaction::Interaction;
+use crate::trace::moment::Moment;
 use crate::trace::ray::Ray;
 use glam::{Vec2, Vec3};
 
@@ -97,18 +98,18 @@ impl<'a, C: Carriage> FromLight<'a, C> {
 pub fn from_light<'a, C: Carriage>(
     scene: &'a Scene,
     rules: &'a Rules,
-    sampler: &'a Sampler,
+    (sampler, moment): (&'a Sampler, Moment),
     keeps: Keeps,
     tally: &mut Tally,
 ) -> Vec<LightVertex<'a, C::Light>> {
     let pair = |what| sampler.pair(Dimension::Start(what));
     let choice = pair(StartUse::Choice);
     let environment = scene.environment.as_ref();
-    let origin = scene.lights.origin(&scene.data, environment, choice.x, pair(StartUse::Place));
+    let origin = scene.lights.origin(&scene.data, environment, moment, choice.x, pair(StartUse::Place));
     let Some(origin) = origin else { return Vec::new() };
     let Some(state) = rules.language.light_start(rules.tag(origin.light)) else { return Vec::new() };
     if rules.uses((1, 1)) {
-        show::<C>(scene, rules, &origin, state, pair(StartUse::Lens), tally);
+        show::<C>((scene, moment), rules, &origin, state, pair(StartUse::Lens), tally);
     }
     let Some(emission) = origin.place.emit(&scene.data, choice.y, pair(StartUse::Direction)) else {
         return Vec::new();
@@ -127,7 +128,7 @@ pub fn from_light<'a, C: Carriage>(
         _ => emission.ray.origin,
     };
     let density = Density::SolidAngle(emission.pdf);
-    let edge = Edge { ray: emission.ray, from, cos, density, kind };
+    let edge = Edge { ray: emission.ray.at(moment), from, cos, density, kind };
     let partial = Partial { near, far };
     let mut walk = Walk::new((scene, rules, sampler), Transport::Importance, edge, carried, partial);
     if walk.keeps_links() {
@@ -141,26 +142,26 @@ pub fn from_light<'a, C: Carriage>(
 
 /// Joins the place that light starts from to the lens itself.
 fn show<C: Carriage>(
-    scene: &Scene,
+    (scene, moment): (&Scene, Moment),
     rules: &Rules,
     origin: &Origin<'_>,
     state: LightState,
     lens: Vec2,
     tally: &mut Tally,
 ) {
-    let view = &scene.view;
+    let view = scene.view(moment);
     let (seen, radiance, ray, squared, cos) = match &origin.place {
         Place::Surface(at) => {
             let Some(seen) = view.see(at.position, lens) else { return };
             let radiance = at.emission(at.side(seen.direction)) * at.alpha();
             let start = at.leave(seen.direction);
-            let ray = Ray { origin: start, direction: seen.end - start, t_max: 1.0 };
+            let ray = Ray { origin: start, direction: seen.end - start, t_max: 1.0, moment };
             let squared = f64::from((seen.end - at.position).length_squared());
             (seen, radiance, ray, squared, f64::from(seen.direction.dot(at.ng).abs()))
         }
         Place::Sky(towards, radiance) => {
             let Some(seen) = view.see_far(*towards, lens) else { return };
-            (seen, *radiance, Ray::new(seen.end, *towards), 1.0, 1.0)
+            (seen, *radiance, Ray::new(seen.end, *towards).at(moment), 1.0, 1.0)
         }
         Place::Point(..) | Place::Sun(..) => return,
     };

@@ -7,6 +7,7 @@ pub mod light;
 pub mod media;
 pub mod mis;
 pub mod photons;
+pub mod reach;
 pub mod rules;
 pub mod tally;
 pub mod throughput;

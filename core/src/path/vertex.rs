@@ -159,7 +159,7 @@ impl<'s> Vertex<'s> {
 
     /// The ray that leaves towards `direction`.
     pub fn ray(&self, direction: Vec3) -> Ray {
-        Ray::new(self.leave(direction), direction)
+        Ray::new(self.leave(direction), direction).at(self.at.moment).at(self.at.moment)
     }
 
     /// Shading normals are no symmetric part of a BSDF: light that is carried from its source counts

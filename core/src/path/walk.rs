@@ -13,6 +13,7 @@ use crate::path::vertex::{Continuation, Crossing, Density, Vertex};
 use crate::sampler::{Dimension, Sampler, Use};
 use crate::scene::Scene;
 use crate::scene::interaction::Interaction;
+use crate::scene::view::View;
 use crate::trace::ray::Ray;
 use core::marker::PhantomData;
 use glam::Vec3;
@@ -142,7 +143,12 @@ impl<'a, S: State, T: Throughput<S>> Walk<'a, S, T> {
                 visitor.escapes(&self, tally);
                 return;
             };
-            let at = self.scene.data.interaction(hit.instance, hit.triangle, hit.barycentric);
+            let at = self.scene.data.interaction(
+                hit.instance,
+                hit.triangle,
+                hit.barycentric,
+                self.edge.ray.moment,
+            );
             self.arrive(&at);
             visitor.arrives(&mut self, &at, (hit.instance, hit.triangle), tally);
             if self.scatterings >= self.rules.bounces || !visitor.goes_on(&self) {
@@ -169,9 +175,14 @@ impl<'a, S: State, T: Throughput<S>> Walk<'a, S, T> {
         matches!(self.rules.weighing, Weighing::Chosen(_))
     }
 
+    /// From where the scene is seen at the walk's moment.
+    pub fn view(&self) -> View {
+        self.scene.view(self.edge.ray.moment)
+    }
+
     /// Density of a place on the lens, where it has extent.
     pub fn lens(&self) -> Option<f64> {
-        self.scene.view.lens_pdf()
+        self.view().lens_pdf()
     }
 
     /// What the ends of a path admit that begins at a light like this.

@@ -13,6 +13,7 @@ use crate::radiosity::patch::Patch;
 use crate::radiosity::reflectance;
 use crate::sampler::{Dimension, Sampler, Use};
 use crate::scene::data::SceneData;
+use crate::trace::moment::Moment;
 use core::f32::consts::FRAC_1_PI;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -64,7 +65,7 @@ fn row(surroundings: &Surroundings<'_>, element: Element, count: u32) -> Row {
         let sampler = Sampler::new(0, REPLICATE, [element.0, 0], index);
         let pair = |what| sampler.pair(Dimension::Eye(0, what));
         let place = patch.on_triangle(warp::triangle(pair(Use::Choice)));
-        let at = data.interaction(patch.instance, patch.triangle, place);
+        let at = data.interaction(patch.instance, patch.triangle, place, Moment::STILL);
         let alpha = at.alpha();
         if alpha == 0.0 {
             continue;
@@ -99,7 +100,7 @@ pub fn look_at(data: &SceneData, patch: &Patch) -> (f64, Rgb) {
     for index in 0..REFLECTANCE_POINTS {
         let sampler = Sampler::new(0, REPLICATE, [patch.triangle, patch.instance], index);
         let place = patch.on_triangle(warp::triangle(sampler.pair(Dimension::Eye(0, Use::Choice))));
-        let at = data.interaction(patch.instance, patch.triangle, place);
+        let at = data.interaction(patch.instance, patch.triangle, place, Moment::STILL);
         let alpha = f64::from(at.alpha());
         covered += alpha;
         reflected += reflectance::mean(&Bsdf::from_surface(&at.surface())).as_dvec3() * alpha;

@@ -8,6 +8,7 @@ use crate::scene::Scene;
 use crate::scene::interaction::{Interaction, Side};
 use crate::scene::light::{FoundBy, ShadowEnd};
 use crate::settings::Shadows;
+use crate::trace::moment::Moment;
 use crate::trace::ray::Ray;
 use core::f32::consts::FRAC_1_PI;
 use glam::{Vec2, Vec3};
@@ -123,8 +124,14 @@ impl Surroundings<'_> {
             return Rgb::ZERO;
         }
         let environment = scene.environment.as_ref();
-        let sampled =
-            scene.lights.sample(&scene.data, environment, at.position, numbers.light, numbers.place);
+        let sampled = scene.lights.sample(
+            &scene.data,
+            environment,
+            Moment::STILL,
+            at.position,
+            numbers.light,
+            numbers.place,
+        );
         let Some((_, event)) = sampled else { return Rgb::ZERO };
         let (f, pdf) = value(event.direction);
         let weight = match (event.found_by, self.sources) {
@@ -137,7 +144,9 @@ impl Surroundings<'_> {
         }
         let origin = at.leave(event.direction);
         let ray = match event.end {
-            ShadowEnd::Point(end) => Ray { origin, direction: end - origin, t_max: 1.0 },
+            ShadowEnd::Point(end) => {
+                Ray { origin, direction: end - origin, t_max: 1.0, moment: Moment::STILL }
+            }
             ShadowEnd::Infinity => Ray::new(origin, event.direction),
         };
         let passes = match self.shadows {
@@ -171,7 +180,7 @@ impl Surroundings<'_> {
             let light_pdf = scene.lights.environment_pdf(environment, direction);
             return (environment.radiance(direction) * weight(light_pdf), None);
         };
-        let there = scene.data.interaction(hit.instance, hit.triangle, hit.barycentric);
+        let there = scene.data.interaction(hit.instance, hit.triangle, hit.barycentric, Moment::STILL);
         let side = there.side(-direction);
         let mut radiance = Rgb::ZERO;
         if there.material.emits() {

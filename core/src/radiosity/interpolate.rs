@@ -7,6 +7,7 @@ use crate::math::colour::Rgb;
 use crate::radiosity::element::Element;
 use crate::radiosity::patch::{Patch, Patches, midpoint};
 use crate::scene::data::SceneData;
+use crate::trace::moment::Moment;
 use glam::{DVec3, Vec2, Vec3};
 
 /// Cosine of the angle, 25°, up to which surfaces that meet count as one.
@@ -40,7 +41,7 @@ fn bits(place: Vec3) -> [u32; 3] {
 
 /// The unit normal at a corner of an element, on its side. Bumps of a normal map do not count.
 fn normal(data: &SceneData, patch: &Patch, corner: usize, sign: f32) -> Vec3 {
-    let at = data.interaction(patch.instance, patch.triangle, patch.weights[corner]);
+    let at = data.interaction(patch.instance, patch.triangle, patch.weights[corner], Moment::STILL);
     let normal = if at.material.normal.is_some() { at.ng } else { at.shading.z };
     normal * sign
 }

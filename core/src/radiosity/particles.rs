@@ -12,6 +12,7 @@ use crate::radiosity::reflectance;
 use crate::sampler::{Dimension, Sampler, StartUse, Use};
 use crate::scene::Scene;
 use crate::scene::interaction::Side;
+use crate::trace::moment::Moment;
 use crate::trace::ray::Ray;
 use core::f64::consts::PI;
 use glam::DVec3;
@@ -65,7 +66,8 @@ fn follow(scene: &Scene, patches: &Patches, sampler: &Sampler, most: u32, landed
     let pair = |what| sampler.pair(Dimension::Start(what));
     let choice = pair(StartUse::Choice);
     let environment = scene.environment.as_ref();
-    let origin = scene.lights.origin(&scene.data, environment, choice.x, pair(StartUse::Place));
+    let origin =
+        scene.lights.origin(&scene.data, environment, Moment::STILL, choice.x, pair(StartUse::Place));
     let Some(origin) = origin else { return };
     let Some(emission) = origin.place.emit(&scene.data, choice.y, pair(StartUse::Direction)) else { return };
     let density = f64::from(origin.pdf) * f64::from(emission.pdf);
@@ -75,7 +77,7 @@ fn follow(scene: &Scene, patches: &Patches, sampler: &Sampler, most: u32, landed
         landed.rays += 1;
         let dimension = |what| Dimension::Light(n, what);
         let Some(hit) = scene.closest(&ray, || sampler.key(dimension(Use::Alpha))) else { return };
-        let at = scene.data.interaction(hit.instance, hit.triangle, hit.barycentric);
+        let at = scene.data.interaction(hit.instance, hit.triangle, hit.barycentric, Moment::STILL);
         let back = -ray.direction;
         let (side, sign) = match at.side(back) {
             Side::Front => (Side::Front, 1.0),

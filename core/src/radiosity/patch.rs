@@ -1,6 +1,7 @@
 //! Triangles of a scene, cut into patches.
 
 use crate::scene::data::SceneData;
+use crate::trace::moment::Moment;
 use glam::{Vec2, Vec3};
 
 /// A triangle is halved at most this often: f32 then still tells the corners of its patches apart.
@@ -104,7 +105,7 @@ impl Patches {
             let mesh = &data.meshes[instance.mesh.index()];
             patches.roots.push(patches.cells.len() as u32);
             for triangle in 0..mesh.triangles.len() as u32 {
-                let corners = mesh.corners(triangle).map(|p| instance.placement.point(p));
+                let corners = mesh.corners(triangle, Moment::STILL).map(|p| instance.placement.point(p));
                 patches.cells.push(Cell::Whole(PatchId(patches.all.len() as u32)));
                 let weights = [Vec2::ZERO, Vec2::X, Vec2::Y];
                 patches.all.push(Patch { instance: i as u32, triangle, weights, corners, level: 0 });

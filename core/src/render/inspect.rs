@@ -1,16 +1,25 @@
 //! What is in a scene, what a render of it needs and what it leaves out.
 
+use crate::bsdf::Bsdf;
+use crate::bsdf::event::Letters;
+use crate::bsdf::surface::SurfaceParameters;
 use crate::gltf::bundle::Bundle;
 use crate::gltf::error::{LoadError, Problem};
 use crate::gltf::limits::Limits;
 use crate::gltf::load::load;
 use crate::gltf::report::Report;
+use crate::math::colour::Rgb;
+use crate::path::expression::language::LightTag;
+use crate::path::reach::{EyeKind, LightKind, Surroundings};
 use crate::render::prepare::is_lit;
-use crate::scene::camera::Camera;
+use crate::scene::camera::{Camera, Projection};
 use crate::scene::data::SceneData;
-use crate::scene::material::{Coverage, Material};
+use crate::scene::material::{Coverage, Material, RoughnessMap};
 use crate::scene::punctual::PunctualKind;
 use std::sync::Arc;
+
+/// What a scene without light needs.
+pub const DEFAULT_SKY: &str = "default sky";
 
 /// What is in a scene.
 #[derive(Clone, Debug)]
@@ -21,6 +30,10 @@ pub struct Contents {
     pub punctual: [u32; 3],
     /// Width over height that each camera asks for.
     pub aspects: Vec<Option<f32>>,
+    /// Whether each camera's rays are parallel.
+    pub parallel: Vec<bool>,
+    /// Letters that its surfaces can have, by the factors of their materials.
+    pub letters: Letters,
     /// What a render needs.
     pub needs: Vec<String>,
     /// What a render leaves out.
@@ -40,16 +53,71 @@ pub fn inspect(bytes: impl Into<Arc<[u8]>>, limits: &Limits) -> Result<Contents,
         count(|k| matches!(k, PunctualKind::Directional { .. })),
     ];
     let (mut needs, mut leaves_out) = (Vec::new(), Vec::new());
-    for (name, needed) in features(data) {
+    for (name, needed) in features(&loaded.report, data) {
         let list = if needed { &mut needs } else { &mut leaves_out };
         list.push(name.to_owned());
     }
-    let aspects = data.cameras.iter().map(Camera::aspect).collect();
-    Ok(Contents { report: loaded.report, punctual, aspects, needs, leaves_out, warnings: loaded.warnings })
+    Ok(Contents {
+        punctual,
+        aspects: data.cameras.iter().map(Camera::aspect).collect(),
+        parallel: (data.cameras.iter())
+            .map(|camera| matches!(camera.projection, Projection::Orthographic { .. }))
+            .collect(),
+        letters: data.materials.iter().map(letters).fold(Letters::NONE, Letters::union),
+        needs,
+        leaves_out,
+        report: loaded.report,
+        warnings: loaded.warnings,
+    })
+}
+
+impl Contents {
+    /// What of it matters to techniques, seen by its first camera under its own light; `tags` are those of any light.
+    pub fn surroundings(&self, tags: &[LightTag]) -> Surroundings {
+        let sky = self.needs.iter().any(|need| need == DEFAULT_SKY);
+        let kinds = [
+            (LightKind::Surface, self.report.emissive_triangles > 0),
+            (LightKind::Environment, sky),
+            (LightKind::Punctual, self.punctual != [0; 3]),
+        ];
+        let there = kinds.into_iter().filter(|(_, there)| *there);
+        let parallel = self.parallel.first() == Some(&true);
+        Surroundings {
+            letters: self.letters,
+            lights: there.flat_map(|(kind, _)| tags.iter().map(move |tag| (kind, *tag))).collect(),
+            eye: if parallel { EyeKind::Parallel } else { EyeKind::Pinhole },
+        }
+    }
+}
+
+/// Letters that a material can have: textures can take metallic, transmission and specular down to nothing; roughness
+/// is taken by its factor.
+fn letters(material: &Material) -> Letters {
+    let textured_metal = matches!(material.roughness_map, Some(RoughnessMap::MetallicRoughness(_)));
+    let choices = |factor: f32, textured: bool| [factor, if textured { 0.0 } else { factor }];
+    let mut letters = Letters::NONE;
+    for metallic in choices(material.metallic, textured_metal) {
+        for transmission in choices(material.transmission.factor, material.transmission.texture.is_some()) {
+            for specular in choices(material.specular.factor, material.specular.texture.is_some()) {
+                let surface = SurfaceParameters {
+                    base_color: Rgb::ONE,
+                    metallic,
+                    roughness: material.roughness,
+                    specular,
+                    specular_color: material.specular_color.factor,
+                    ior: material.ior,
+                    transmission,
+                    walls: material.walls(),
+                };
+                letters = letters.union(Bsdf::from_surface(&surface).letters());
+            }
+        }
+    }
+    letters
 }
 
 /// Each feature that a scene may need, and whether this one does.
-fn features(data: &SceneData) -> [(&'static str, bool); 11] {
+fn features(report: &Report, data: &SceneData) -> [(&'static str, bool); 14] {
     let any = |of: fn(&Material) -> bool| data.materials.iter().any(of);
     [
         ("triangles", data.meshes.iter().any(|m| !m.triangles.is_empty())),
@@ -62,6 +130,9 @@ fn features(data: &SceneData) -> [(&'static str, bool); 11] {
         ("volumes", any(|m| m.volume.is_some())),
         ("emissive surfaces", any(Material::emits)),
         ("punctual lights", !data.punctual.is_empty()),
-        ("default sky", !is_lit(data)),
+        (DEFAULT_SKY, !is_lit(data)),
+        ("animation", report.animated.nodes > 0),
+        ("skins", report.animated.skins > 0),
+        ("morph targets", report.animated.morphs > 0),
     ]
 }

@@ -62,6 +62,7 @@ where
     C::Light: Send,
 {
     let paths = sampling.rules.light_paths as u64;
+    let moment = sampling.moment_of_pass(index);
     let traced = (0..paths.div_ceil(PATHS))
         .into_par_iter()
         .map(|run| {
@@ -72,7 +73,7 @@ where
             let mut all: Vec<Photon<C::Light>> = Vec::new();
             for number in run * PATHS..((run + 1) * PATHS).min(paths) {
                 let sampler = sampling.light_path(index, number);
-                all.extend(photons::<C>(sampling.scene, sampling.rules, &sampler, &mut tally));
+                all.extend(photons::<C>(sampling.scene, sampling.rules, (&sampler, moment), &mut tally));
             }
             Ok((all, tally.rays))
         })
@@ -97,10 +98,11 @@ where
         return Err(RenderError::Stopped);
     }
     let mut tally = Tally::new(sampling.rules.planes());
+    let moment = sampling.moment_of_pass(index);
     let mut tile = Tile { values: Vec::new(), invalid: InvalidSamples::default(), rays: 0 };
     for pixel in pixels(region) {
         tally.clear();
-        let (sampler, ray) = sampling.eye(pixel, index);
+        let (sampler, ray) = sampling.eye_in_pass(pixel, index, moment);
         photon::sample::<C>(sampling.scene, sampling.rules, (&sampler, ray), map, &mut tally);
         for (plane, value) in tally.planes.iter().enumerate() {
             let value = tile.invalid.checked(*value);

@@ -3,7 +3,7 @@
 use crate::gltf::bundle::Bundle;
 use crate::gltf::error::LoadError;
 use crate::gltf::limits::Limits;
-use crate::gltf::load::load;
+use crate::gltf::load::load_while;
 use crate::method::radiosity::Reconstruction;
 use crate::radiosity::fineness::Fineness;
 use crate::radiosity::solution::{Solution, TooManyTriangles};
@@ -12,7 +12,7 @@ use crate::scene::camera::Camera;
 use crate::scene::data::SceneData;
 use crate::scene::environment::{Environment, EnvironmentError};
 use crate::scene::material::Material;
-use crate::scene::view::{LensInScene, View};
+use crate::scene::view::{LensInScene, Views};
 use crate::settings::{CameraChoice, EnvironmentSource, Method, Settings};
 use crate::trace::build_error::BuildError;
 use std::sync::Arc;
@@ -78,9 +78,10 @@ pub fn open(
     environment: Option<&[u8]>,
     settings: &Settings,
 ) -> Result<Scene, PrepareError> {
-    let loaded = load(&Bundle::open(bytes)?, &Limits::default())?;
+    let times = [settings.shutter.open, settings.shutter.close];
+    let loaded = load_while(&Bundle::open(bytes)?, &Limits::default(), times)?;
     let data = loaded.scene;
-    let view = view(&data, settings)?;
+    let views = views(&data, settings)?;
     let given = match &settings.environment {
         None => None,
         Some(given) => Some(match &given.source {
@@ -92,7 +93,7 @@ pub fn open(
         }),
     };
     let environment = given.or_else(|| (!is_lit(&data)).then(Environment::default_sky));
-    Ok(Scene::new(data, environment, view)?)
+    Ok(Scene::new(data, environment, views)?)
 }
 
 /// Whether a scene has light of its own.
@@ -100,7 +101,7 @@ pub fn is_lit(data: &SceneData) -> bool {
     !data.punctual.is_empty() || data.materials.iter().any(Material::emits)
 }
 
-fn view(data: &SceneData, settings: &Settings) -> Result<View, PrepareError> {
+fn views(data: &SceneData, settings: &Settings) -> Result<Views, PrepareError> {
     let framed;
     let camera = match settings.camera {
         CameraChoice::Framed => {
@@ -115,5 +116,5 @@ fn view(data: &SceneData, settings: &Settings) -> Result<View, PrepareError> {
         radius: distance(lens.radius),
         focus_distance: distance(lens.focus_distance),
     });
-    Ok(View::new(camera, settings.size, lens))
+    Ok(Views::new(camera, settings.size, lens))
 }

@@ -7,9 +7,10 @@ use crate::path::rules::Rules;
 use crate::path::tally::Tally;
 use crate::path::throughput::Carriage;
 use crate::radiosity::solution::Solution;
-use crate::sampler::Sampler;
+use crate::sampler::{Dimension, Sampler};
 use crate::scene::Scene;
 use crate::settings::{Method, Settings};
+use crate::trace::moment::Moment;
 use crate::trace::ray::Ray;
 
 /// All that a sample depends on beside its pixel and index.
@@ -32,7 +33,10 @@ impl Sampling<'_> {
                 let (eye, ray) = self.eye(pixel, index);
                 path::sample::<C>(scene, rules, ray, &eye, tally);
             }
-            Method::Light => light::sample::<C>(scene, rules, &self.light(pixel, index), tally),
+            Method::Light => {
+                let moment = self.moment(&self.pixel(pixel, index));
+                light::sample::<C>(scene, rules, (&self.light(pixel, index), moment), tally);
+            }
             Method::Bidirectional => {
                 let (eye, ray) = self.eye(pixel, index);
                 let light = self.light(pixel, index);
@@ -63,9 +67,27 @@ impl Sampling<'_> {
     }
 
     /// The numbers of a pixel's sample, and its camera ray.
-    pub(super) fn eye(&self, pixel: [u32; 2], index: u32) -> (Sampler, Ray) {
-        let eye = Sampler::new(self.settings.seed, self.batch.replicate, pixel, index);
-        let ray = camera_ray(self.scene, self.settings, pixel, &eye);
-        (eye, ray)
+    fn eye(&self, pixel: [u32; 2], index: u32) -> (Sampler, Ray) {
+        let eye = self.pixel(pixel, index);
+        (eye, camera_ray(self.scene, self.settings, pixel, &eye, self.moment(&eye)))
+    }
+
+    /// The same at the moment of a pass.
+    pub(super) fn eye_in_pass(&self, pixel: [u32; 2], index: u32, moment: Moment) -> (Sampler, Ray) {
+        let eye = self.pixel(pixel, index);
+        (eye, camera_ray(self.scene, self.settings, pixel, &eye, moment))
+    }
+
+    /// The moment of a pass of photons: photons and those who gather them have it in common.
+    pub(super) fn moment_of_pass(&self, index: u32) -> Moment {
+        self.moment(&self.pixel([u32::MAX; 2], index))
+    }
+
+    fn pixel(&self, pixel: [u32; 2], index: u32) -> Sampler {
+        Sampler::new(self.settings.seed, self.batch.replicate, pixel, index)
+    }
+
+    fn moment(&self, eye: &Sampler) -> Moment {
+        self.scene.moment(|| eye.pair(Dimension::Time).x)
     }
 }

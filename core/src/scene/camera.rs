@@ -1,6 +1,7 @@
 //! Where a picture is taken from.
 
 use crate::scene::bounds::Bounds;
+use crate::trace::moment::Moment;
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 
 /// Where a picture is taken from, in the scene's space.
@@ -19,6 +20,17 @@ pub struct Camera {
     pub backward: Vec3,
     /// How directions spread.
     pub projection: Projection,
+    /// Where it is at each knot; empty of one that stands. The first is that above.
+    pub knots: Vec<Stand>,
+}
+
+/// Where a camera stands and looks: as in [`Camera`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stand {
+    /// The eye.
+    pub position: Vec3,
+    /// To the right, to the top and away from what is seen.
+    pub axes: [Vec3; 3],
 }
 
 /// How directions spread.
@@ -60,7 +72,27 @@ impl Camera {
             perspective @ Projection::Perspective { .. } => perspective,
         };
         let [right, up, backward] = [unit.x_axis, unit.y_axis, unit.z_axis].map(DVec3::as_vec3);
-        Some(Self { name, position, right, up, backward, projection })
+        Some(Self { name, position, right, up, backward, projection, knots: Vec::new() })
+    }
+
+    /// Where it stands, at the first knot.
+    pub fn stand(&self) -> Stand {
+        Stand { position: self.position, axes: [self.right, self.up, self.backward] }
+    }
+
+    /// Where it stands at a moment. Between knots the eye goes straight; axes turn along the chord, with lengths
+    /// between those at the knots.
+    pub fn stand_at(&self, moment: Moment) -> Stand {
+        if self.knots.is_empty() {
+            return self.stand();
+        }
+        let [a, b] = moment.ends(&self.knots);
+        let axis = |i: usize| {
+            let length = moment.number(a.axes[i].length(), b.axes[i].length());
+            let chord = moment.vector(a.axes[i], b.axes[i]);
+            chord.try_normalize().map_or(a.axes[i], |unit| unit * length)
+        };
+        Stand { position: moment.vector(a.position, b.position), axes: [axis(0), axis(1), axis(2)] }
     }
 
     /// A camera that sees all of `bounds` (in scene units) from in front, a little right and above, for
@@ -85,6 +117,7 @@ impl Camera {
             up: up.as_vec3(),
             backward: backward.as_vec3(),
             projection: Projection::Perspective { tan_half_y: tan_half_y as f32, aspect: None },
+            knots: Vec::new(),
         }
     }
 

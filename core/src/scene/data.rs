@@ -3,6 +3,7 @@
 use crate::scene::bounds::Bounds;
 use crate::scene::camera::Camera;
 use crate::scene::instance::Instance;
+use crate::scene::knots::Knots;
 use crate::scene::material::Material;
 use crate::scene::mesh::Mesh;
 use crate::scene::normalisation::Normalisation;
@@ -24,10 +25,12 @@ pub struct SceneData {
     pub cameras: Vec<Camera>,
     /// Lights without extent.
     pub punctual: Vec<Punctual>,
-    /// A box around all geometry, in the scene's space.
+    /// A box around all geometry at all knots, in the scene's space.
     pub bounds: Bounds,
     /// From the file's space to the scene's.
     pub normalisation: Normalisation,
+    /// The knots of its motion, at each of which what moves tells where it is.
+    pub knots: Knots,
 }
 
 impl SceneData {
@@ -42,7 +45,14 @@ impl SceneData {
             punctual: Vec::new(),
             bounds: Bounds::EMPTY,
             normalisation: Normalisation::IDENTITY,
+            knots: Knots::STILL,
         }
+    }
+
+    /// Whether an instance moves or changes its shape.
+    pub fn moves(&self, instance: u32) -> bool {
+        let Instance { mesh, placement, .. } = &self.instances[instance as usize];
+        !placement.knots().is_empty() || !self.meshes[mesh.index()].forms.is_empty()
     }
 
     /// Name of the node that a triangle of an instance comes from; may be empty.

@@ -10,6 +10,7 @@ use crate::scene::light::{Light, area, mesh_order};
 use crate::scene::lights::Lights;
 use crate::scene::material::Sides;
 use crate::scene::punctual::PunctualKind;
+use crate::trace::moment::Moment;
 use crate::trace::ray::Ray;
 use core::f32::consts::{FRAC_1_PI, PI};
 use glam::{Vec2, Vec3};
@@ -33,7 +34,7 @@ pub enum Place<'a> {
     /// On a surface.
     Surface(Interaction<'a>),
     /// At a point.
-    Point(&'a PunctualKind, Vec3),
+    Point(PunctualKind, Vec3),
     /// Infinitely far in a unit direction that was sampled, with this radiance.
     Sky(Vec3, Rgb),
     /// Infinitely far in the one direction that it has, with this irradiance at right angles.
@@ -55,11 +56,12 @@ pub struct Emission {
 }
 
 impl Lights {
-    /// A place that light starts from; `None` where nothing shines there.
+    /// A place that light starts from at a moment; `None` where nothing shines there.
     pub fn origin<'a>(
         &self,
         data: &'a SceneData,
         environment: Option<&Environment>,
+        moment: Moment,
         choice: f32,
         u: Vec2,
     ) -> Option<Origin<'a>> {
@@ -67,15 +69,15 @@ impl Lights {
         let (pdf, place) = match *self.light(light) {
             Light::Triangle { instance, triangle } => {
                 let barycentric = mesh_order(data, instance, warp::triangle(u));
-                let at = data.interaction(instance, triangle, barycentric);
-                (1.0 / area(data.corners(instance, triangle)), Place::Surface(at))
+                let at = data.interaction(instance, triangle, barycentric, moment);
+                (1.0 / area(data.corners(instance, triangle, moment)), Place::Surface(at))
             }
-            Light::Punctual(index) => match &data.punctual[index as usize].kind {
+            Light::Punctual(index) => match data.punctual[index as usize].at(moment) {
                 kind @ (PunctualKind::Point { position, .. } | PunctualKind::Spot { position, .. }) => {
-                    (1.0, Place::Point(kind, *position))
+                    (1.0, Place::Point(kind, position))
                 }
                 PunctualKind::Directional { direction, irradiance } => {
-                    (1.0, Place::Sun(-*direction, *irradiance))
+                    (1.0, Place::Sun(-direction, irradiance))
                 }
             },
             Light::Environment => {
@@ -99,11 +101,12 @@ pub struct EmissionDensity {
 }
 
 impl Lights {
-    /// For the light of a number, seen in the unit direction `towards`, whose surface light leaves at the cosine `cos`.
+    /// For the light of a number at a moment, seen in the unit direction `towards`, whose surface light leaves at the cosine `cos`.
     pub fn emission_density(
         &self,
         data: &SceneData,
         environment: Option<&Environment>,
+        moment: Moment,
         light: u32,
         towards: Vec3,
         cos: f32,
@@ -111,7 +114,7 @@ impl Lights {
         let (origin, emission) = match *self.light(light) {
             Light::Triangle { instance, triangle } => {
                 let sides = data.material(instance, triangle).sides;
-                (1.0 / area(data.corners(instance, triangle)), surface_direction_pdf(sides, cos))
+                (1.0 / area(data.corners(instance, triangle, moment)), surface_direction_pdf(sides, cos))
             }
             Light::Punctual(index) => match &data.punctual[index as usize].kind {
                 PunctualKind::Directional { .. } => (1.0, disk_pdf(data)),

@@ -189,6 +189,7 @@ mod tests {
             up: Vec3::Y,
             backward: Vec3::new(-0.8, 0.0, 0.6),
             projection,
+            knots: Vec::new(),
         };
         let perspective = camera(Projection::Perspective { tan_half_y: 0.7, aspect: None });
         let orthographic = camera(Projection::Orthographic { half_width: 4.0, half_height: 3.0 });

@@ -2,6 +2,7 @@
 
 use crate::scene::mesh::MeshId;
 use crate::trace::instance::Moved as Traced;
+use crate::trace::moment::Moment;
 use glam::{Affine3A, DAffine3, DMat3, Mat3A, Vec3};
 
 /// A mesh at a place.
@@ -16,13 +17,24 @@ pub struct Instance {
 }
 
 /// Where an instance stands.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 #[expect(clippy::large_enum_variant, reason = "all instances are moved but one at most, the gathered mesh")]
 pub enum Placement {
     /// The mesh's vertices are the scene's already.
     World,
     /// The mesh is moved into the scene.
     Moved(Moved),
+    /// The mesh moves.
+    Moving(Motion),
+}
+
+/// Transforms along which a mesh moves, none of which flattens space.
+#[derive(Clone, Debug)]
+pub struct Motion {
+    /// Mesh to scene at each knot.
+    pub knots: Box<[Affine3A]>,
+    /// Whether they mirror: all or none.
+    pub handedness: Handedness,
 }
 
 /// An invertible transform and what follows from it.
@@ -104,21 +116,57 @@ impl Moved {
     }
 }
 
+impl Motion {
+    /// From the transform at each knot; `None` where one cannot be inverted in single precision, or some mirror and
+    /// others do not.
+    pub fn new(knots: &[DAffine3]) -> Option<Self> {
+        let moved = knots.iter().map(Moved::new).collect::<Option<Vec<_>>>()?;
+        let handedness = moved.first()?.handedness;
+        let knots = moved.iter().map(|m| m.to_world).collect();
+        moved.iter().all(|m| m.handedness == handedness).then_some(Self { knots, handedness })
+    }
+
+    /// Where it has come to. The transform is that by which rays go, to the bit; normals go by its cofactors, which
+    /// exist where it is flat.
+    pub fn at(&self, moment: Moment) -> Moved {
+        let to_world = moment.transform(&self.knots);
+        let cofactors = normal_matrix(&glam::Mat3::from(to_world.matrix3).as_dmat3());
+        let longest = cofactors.x_axis.length().max(cofactors.y_axis.length()).max(cofactors.z_axis.length());
+        let normals = if longest > 0.0 { cofactors * (1.0 / longest) } else { cofactors };
+        let normal_to_world = Mat3A::from(normals.as_mat3());
+        // A transform between two knots may be flat, at a moment that has no length: no ray meets the mesh then.
+        let traced = Traced::new(to_world).or_else(|| Traced::new(self.knots[0]));
+        let traced = traced.expect("transforms at knots can be inverted");
+        Moved { to_world, normal_to_world, handedness: self.handedness, traced }
+    }
+}
+
 impl Placement {
-    /// Mesh to scene.
+    /// The transforms at the knots; none of what stands.
+    pub fn knots(&self) -> &[Affine3A] {
+        match self {
+            Self::World | Self::Moved(_) => &[],
+            Self::Moving(motion) => &motion.knots,
+        }
+    }
+
+    /// Mesh to scene; of what moves, at the first knot.
     pub fn to_world(&self) -> Affine3A {
         match self {
             Self::World => Affine3A::IDENTITY,
             Self::Moved(moved) => moved.to_world,
+            Self::Moving(motion) => motion.knots[0],
         }
     }
 
-    /// A normal of the mesh in the scene, of unit length; zero where it vanishes.
+    /// A normal of the mesh in the scene, of unit length; zero where it vanishes. Like the rest below, of what moves
+    /// this is at the first knot.
     #[inline]
     pub fn normal(&self, normal: Vec3) -> Vec3 {
         match self {
             Self::World => normal,
             Self::Moved(moved) => (moved.normal_to_world * normal).normalize_or_zero(),
+            Self::Moving(motion) => (motion.at(Moment::STILL).normal_to_world * normal).normalize_or_zero(),
         }
     }
 
@@ -128,6 +176,7 @@ impl Placement {
         match self {
             Self::World => direction,
             Self::Moved(moved) => moved.to_world.transform_vector3(direction),
+            Self::Moving(motion) => motion.knots[0].transform_vector3(direction),
         }
     }
 
@@ -137,6 +186,7 @@ impl Placement {
         match self {
             Self::World => point,
             Self::Moved(moved) => moved.to_world.transform_point3(point),
+            Self::Moving(motion) => motion.knots[0].transform_point3(point),
         }
     }
 
@@ -146,6 +196,7 @@ impl Placement {
         match self {
             Self::World => Handedness::Kept,
             Self::Moved(moved) => moved.handedness,
+            Self::Moving(motion) => motion.handedness,
         }
     }
 }

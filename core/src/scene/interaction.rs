@@ -4,10 +4,11 @@ use crate::bsdf::surface::SurfaceParameters;
 use crate::math::colour::Rgb;
 use crate::math::frame::Frame;
 use crate::scene::data::SceneData;
-use crate::scene::instance::{Handedness, Placement};
+use crate::scene::instance::{Handedness, Motion, Placement};
 use crate::scene::material::{Material, Sides, SurfaceCoordinates};
 use crate::scene::mesh::Mesh;
 use crate::scene::texture::Texture;
+use crate::trace::moment::Moment;
 use crate::trace::surface_point::SurfacePoint;
 use glam::{Vec2, Vec3, Vec4};
 
@@ -31,6 +32,8 @@ pub struct Interaction<'a> {
     pub shading: Frame,
     /// Where on its textures.
     pub at: SurfaceCoordinates,
+    /// When.
+    pub moment: Moment,
     /// The material.
     pub material: &'a Material,
     textures: &'a [Texture],
@@ -38,11 +41,17 @@ pub struct Interaction<'a> {
 }
 
 impl SceneData {
-    /// Corners of a triangle of an instance, in the scene's space, counter-clockwise seen from the front.
-    pub fn corners(&self, instance: u32, triangle: u32) -> [Vec3; 3] {
+    /// Corners of a triangle of an instance at a moment, in the scene's space, counter-clockwise seen from the front.
+    pub fn corners(&self, instance: u32, triangle: u32, moment: Moment) -> [Vec3; 3] {
         let instance = &self.instances[instance as usize];
-        let [a, b, c] =
-            self.meshes[instance.mesh.index()].corners(triangle).map(|p| instance.placement.point(p));
+        let corners = self.meshes[instance.mesh.index()].corners(triangle, moment);
+        let [a, b, c] = match &instance.placement {
+            Placement::Moving(motion) => {
+                let there = Placement::Moved(motion.at(moment));
+                corners.map(|p| there.point(p))
+            }
+            there => corners.map(|p| there.point(p)),
+        };
         match instance.placement.handedness() {
             Handedness::Kept => [a, b, c],
             Handedness::Mirrored => [a, c, b],
@@ -57,24 +66,41 @@ impl SceneData {
         material.alpha(&self.textures, &coordinates(mesh, triangle, weights(barycentric)))
     }
 
-    /// The point of a triangle with the given weights of its second and third corner (in the mesh's order).
-    pub fn interaction(&self, instance: u32, triangle: u32, barycentric: Vec2) -> Interaction<'_> {
+    /// The point of a triangle with the given weights of its second and third corner (in the mesh's order), at a moment.
+    pub fn interaction(
+        &self,
+        instance: u32,
+        triangle: u32,
+        barycentric: Vec2,
+        moment: Moment,
+    ) -> Interaction<'_> {
         let instance = &self.instances[instance as usize];
         let mesh = &self.meshes[instance.mesh.index()];
+        let point = Place { mesh, triangle, weights: weights(barycentric), moment };
+        match &instance.placement {
+            Placement::Moving(motion) => self.interaction_of_moving(point, motion),
+            there => self.interaction_at(point, there),
+        }
+    }
+
+    #[inline(never)]
+    fn interaction_of_moving(&self, point: Place<'_>, motion: &Motion) -> Interaction<'_> {
+        self.interaction_at(point, &Placement::Moved(motion.at(point.moment)))
+    }
+
+    #[inline]
+    fn interaction_at(&self, point: Place<'_>, placement: &Placement) -> Interaction<'_> {
+        let Place { mesh, triangle, weights, moment } = point;
         let material = &self.materials[mesh.materials[triangle as usize].index()];
-        let weights = weights(barycentric);
-        let corners = mesh.corners(triangle);
-        let moved = match &instance.placement {
-            Placement::World => None,
+        let moved = match placement {
             Placement::Moved(moved) => Some(&moved.traced),
+            Placement::World | Placement::Moving(_) => None,
         };
-        let point = SurfacePoint::new(corners, barycentric, moved);
-        let ng = point.normal;
+        let on = SurfacePoint::new(mesh.corners(triangle, moment), Vec2::new(weights.y, weights.z), moved);
+        let (position, ng) = (on.position, on.normal);
         let at = coordinates(mesh, triangle, weights);
-        let shading = shading_frame(mesh, triangle, weights, &instance.placement, ng, || {
-            material.mapped_normal(&self.textures, &at)
-        });
-        Interaction { position: point.position, ng, shading, at, material, textures: &self.textures, point }
+        let shading = shading_frame(point, placement, ng, || material.mapped_normal(&self.textures, &at));
+        Interaction { position, ng, shading, at, moment, material, textures: &self.textures, point: on }
     }
 }
 
@@ -97,12 +123,19 @@ fn coordinates(mesh: &Mesh, triangle: u32, weights: Vec3) -> SurfaceCoordinates 
     SurfaceCoordinates { uvs: [uv(&mesh.uvs[0]), uv(&mesh.uvs[1])], colour }
 }
 
+/// A point of a mesh at a moment.
+#[derive(Clone, Copy)]
+struct Place<'a> {
+    mesh: &'a Mesh,
+    triangle: u32,
+    weights: Vec3,
+    moment: Moment,
+}
+
 /// Interpolated normal, then the normal map in the frame of tangent and bitangent. What vanishes on the
 /// way falls back to the step before; a normal on the back side is turned to the front.
 fn shading_frame(
-    mesh: &Mesh,
-    triangle: u32,
-    weights: Vec3,
+    Place { mesh, triangle, weights, moment }: Place<'_>,
     placement: &Placement,
     ng: Vec3,
     map: impl FnOnce() -> Option<Vec3>,
@@ -110,13 +143,13 @@ fn shading_frame(
     let corners = mesh.triangles[triangle as usize].map(|v| v as usize);
     let mut normal = ng;
     if !mesh.normals.is_empty() {
-        let smooth = placement.normal(mix(corners.map(|v| mesh.normals[v]), weights));
+        let smooth = placement.normal(mix(mesh.normals(corners, moment), weights));
         normal = front(smooth.try_normalize().unwrap_or(ng), ng);
     }
     if mesh.tangents.is_empty() {
         return Frame::around(normal);
     }
-    let mixed = mix(corners.map(|v| mesh.tangents[v]), weights);
+    let mixed = mix(mesh.tangents(corners, moment), weights);
     if mixed.truncate() == Vec3::ZERO {
         return Frame::around(normal);
     }

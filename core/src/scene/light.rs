@@ -8,6 +8,7 @@ use crate::scene::environment::Environment;
 use crate::scene::instance::Handedness;
 use crate::scene::interaction::{Interaction, Side};
 use crate::scene::punctual::PunctualKind;
+use crate::trace::moment::Moment;
 use glam::{Vec2, Vec3};
 
 /// Below this many steradians a triangle is sampled by area: the density of directions hardly varies over it, and
@@ -68,17 +69,20 @@ pub enum ShadowEnd {
 }
 
 impl Light {
-    /// A next event from `point` with the numbers `u`; `None` where this light sends nothing there.
+    /// A next event from `point` at a moment with the numbers `u`; `None` where this light sends nothing there.
     pub fn sample(
         &self,
         data: &SceneData,
         environment: Option<&Environment>,
+        moment: Moment,
         point: Vec3,
         u: Vec2,
     ) -> Option<NextEvent> {
         match *self {
-            Self::Triangle { instance, triangle } => sample_triangle(data, instance, triangle, point, u),
-            Self::Punctual(index) => sample_punctual(&data.punctual[index as usize].kind, point),
+            Self::Triangle { instance, triangle } => {
+                sample_triangle(data, (instance, triangle), moment, point, u)
+            }
+            Self::Punctual(index) => sample_punctual(&data.punctual[index as usize].at(moment), point),
             Self::Environment => {
                 let environment = environment?;
                 let (direction, pdf) = environment.sample(u);
@@ -107,7 +111,7 @@ pub fn triangle_pdf(
     at: &Interaction<'_>,
     direction: Vec3,
 ) -> f32 {
-    let corners = data.corners(instance, triangle);
+    let corners = data.corners(instance, triangle, at.moment);
     if let Some(spherical) = by_solid_angle(corners, point) {
         return 1.0 / spherical.solid_angle();
     }
@@ -128,17 +132,17 @@ pub fn area(corners: [Vec3; 3]) -> f32 {
 
 fn sample_triangle(
     data: &SceneData,
-    instance: u32,
-    triangle: u32,
+    (instance, triangle): (u32, u32),
+    moment: Moment,
     point: Vec3,
     u: Vec2,
 ) -> Option<NextEvent> {
-    let corners = data.corners(instance, triangle);
+    let corners = data.corners(instance, triangle, moment);
     let (barycentric, solid_angle) = match by_solid_angle(corners, point) {
         Some(spherical) => (meet(corners, point, spherical.sample(u))?, Some(spherical.solid_angle())),
         None => (warp::triangle(u), None),
     };
-    let at = data.interaction(instance, triangle, mesh_order(data, instance, barycentric));
+    let at = data.interaction(instance, triangle, mesh_order(data, instance, barycentric), moment);
     let (direction, distance) =
         (at.position - point).try_normalize().map(|d| (d, (at.position - point).length()))?;
     let cos = -at.ng.dot(direction);

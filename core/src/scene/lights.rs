@@ -9,6 +9,7 @@ use crate::scene::light::{Light, NextEvent, area, triangle_pdf};
 use crate::scene::material::{Material, Sides};
 use crate::scene::punctual::PunctualKind;
 use crate::scene::texture::Texture;
+use crate::trace::moment::Moment;
 use core::f64::consts::PI;
 use glam::{Vec2, Vec3};
 
@@ -111,17 +112,18 @@ impl Lights {
         self.choice.probability(number as usize)
     }
 
-    /// A light's number and a next event from `point` to it; its density includes the choice of the light.
+    /// A light's number and a next event from `point` to it at a moment; its density includes the choice of the light.
     pub fn sample(
         &self,
         data: &SceneData,
         environment: Option<&Environment>,
+        moment: Moment,
         point: Vec3,
         choice: f32,
         place: Vec2,
     ) -> Option<(u32, NextEvent)> {
         let (light, probability) = self.choose(choice)?;
-        let event = self.light(light).sample(data, environment, point, place)?;
+        let event = self.light(light).sample(data, environment, moment, point, place)?;
         Some((light, NextEvent { pdf: event.pdf * probability, ..event }))
     }
 
@@ -168,13 +170,19 @@ impl Lights {
     }
 }
 
-/// π · area · mean luminance, for each side that emits.
+/// π · area (its mean over the shutter's time) · mean luminance, for each side that emits.
 fn triangle_power(data: &SceneData, sides: Sides, radiance: Rgb, instance: u32, triangle: u32) -> f64 {
     let sides = match sides {
         Sides::Front => 1.0,
         Sides::Both => 2.0,
     };
-    PI * sides * f64::from(area(data.corners(instance, triangle))) * f64::from(luminance(radiance))
+    let area = if data.moves(instance) {
+        let at = |(moment, weight)| weight * f64::from(area(data.corners(instance, triangle, moment)));
+        data.knots.weights().map(at).sum()
+    } else {
+        f64::from(area(data.corners(instance, triangle, Moment::STILL)))
+    };
+    PI * sides * area * f64::from(luminance(radiance))
 }
 
 /// The factor times the texture's mean; a texture that is black in the mean still counts a little, since a part

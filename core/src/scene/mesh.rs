@@ -1,6 +1,9 @@
 //! Triangles with what is needed to shade them.
 
 use crate::scene::material::MaterialId;
+use crate::trace::build_error::BuildError;
+use crate::trace::mesh::MeshTree;
+use crate::trace::moment::Moment;
 use glam::{Vec2, Vec3, Vec4};
 
 /// Index of a mesh of the scene.
@@ -36,6 +39,20 @@ pub struct Mesh {
     pub colours: Vec<Vec4>,
     /// Runs of triangles that come from one node, by their first triangle.
     pub parts: Vec<Part>,
+    /// Its shape at the second knot of the scene's motion and all further ones; empty where the shape stays. At the
+    /// first knot it has the shape above.
+    pub forms: Vec<Form>,
+}
+
+/// A mesh's shape at a knot: as many entries as the mesh has, each.
+#[derive(Clone, Debug, Default)]
+pub struct Form {
+    /// Corners.
+    pub positions: Vec<Vec3>,
+    /// Shading normals; zero where the triangle is flat.
+    pub normals: Vec<Vec3>,
+    /// Tangents, with the mesh's signs.
+    pub tangents: Vec<Vec4>,
 }
 
 /// A run of triangles, up to the next one's first.
@@ -48,10 +65,59 @@ pub struct Part {
 }
 
 impl Mesh {
-    /// Positions of a triangle's corners, in the mesh's space.
+    /// Positions of a triangle's corners at a moment, in the mesh's space.
     #[inline]
-    pub fn corners(&self, triangle: u32) -> [Vec3; 3] {
-        self.triangles[triangle as usize].map(|v| self.positions[v as usize])
+    pub fn corners(&self, triangle: u32, moment: Moment) -> [Vec3; 3] {
+        let corners = self.triangles[triangle as usize].map(|v| v as usize);
+        if self.forms.is_empty() {
+            return corners.map(|v| self.positions[v]);
+        }
+        let [a, b] = self.around(moment, |mesh| &mesh.positions, |form| &form.positions);
+        corners.map(|v| moment.vector(a[v], b[v]))
+    }
+
+    /// Shading normals of three vertices at a moment, of any length; the mesh must have normals.
+    #[inline]
+    pub fn normals(&self, vertices: [usize; 3], moment: Moment) -> [Vec3; 3] {
+        if self.forms.is_empty() {
+            return vertices.map(|v| self.normals[v]);
+        }
+        let [a, b] = self.around(moment, |mesh| &mesh.normals, |form| &form.normals);
+        vertices.map(|v| moment.vector(a[v], b[v]))
+    }
+
+    /// Tangents of three vertices at a moment, of any length; the mesh must have tangents.
+    #[inline]
+    pub fn tangents(&self, vertices: [usize; 3], moment: Moment) -> [Vec4; 3] {
+        if self.forms.is_empty() {
+            return vertices.map(|v| self.tangents[v]);
+        }
+        let [a, b] = self.around(moment, |mesh| &mesh.tangents, |form| &form.tangents);
+        vertices.map(|v| moment.vector(a[v].truncate(), b[v].truncate()).extend(a[v].w))
+    }
+
+    /// An attribute at the knots before and after a moment.
+    fn around<'a, T>(
+        &'a self,
+        moment: Moment,
+        first: fn(&'a Self) -> &'a Vec<T>,
+        later: fn(&'a Form) -> &'a Vec<T>,
+    ) -> [&'a [T]; 2] {
+        let knot = |index: usize| {
+            let shape = index.min(self.forms.len()).checked_sub(1).map(|i| &self.forms[i]);
+            shape.map_or(first(self).as_slice(), |shape| later(shape).as_slice())
+        };
+        [knot(moment.piece as usize), knot(moment.piece as usize + 1)]
+    }
+
+    /// The tree that rays walk.
+    pub fn tree(&self) -> Result<MeshTree, BuildError> {
+        if self.forms.is_empty() {
+            return MeshTree::build(&self.positions, &self.triangles);
+        }
+        let first = std::iter::once(self.positions.as_slice());
+        let knots: Vec<&[Vec3]> = first.chain(self.forms.iter().map(|s| s.positions.as_slice())).collect();
+        MeshTree::moving(&knots, &self.triangles)
     }
 
     /// Name of the node a triangle comes from; empty where it has none.
@@ -62,7 +128,11 @@ impl Mesh {
 
     /// Memory that the lists take.
     pub fn bytes(&self) -> usize {
-        self.positions.len() * size_of::<Vec3>()
+        let size = |s: &Form| {
+            (s.positions.len() + s.normals.len()) * size_of::<Vec3>() + s.tangents.len() * size_of::<Vec4>()
+        };
+        self.forms.iter().map(size).sum::<usize>()
+            + self.positions.len() * size_of::<Vec3>()
             + self.triangles.len() * size_of::<[u32; 3]>()
             + self.materials.len() * size_of::<MaterialId>()
             + self.normals.len() * size_of::<Vec3>()

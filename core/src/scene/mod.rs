@@ -9,6 +9,7 @@ pub mod environment;
 pub mod importance;
 pub mod instance;
 pub mod interaction;
+pub mod knots;
 pub mod light;
 pub mod lights;
 pub mod material;
@@ -23,11 +24,12 @@ use crate::scene::data::SceneData;
 use crate::scene::environment::Environment;
 use crate::scene::lights::Lights;
 use crate::scene::material::Coverage;
-use crate::scene::view::View;
+use crate::scene::mesh::Mesh;
+use crate::scene::view::{View, Views};
 use crate::trace::aggregate::Aggregate;
 use crate::trace::build_error::BuildError;
 use crate::trace::instance::Placement;
-use crate::trace::mesh::MeshTree;
+use crate::trace::moment::Moment;
 use crate::trace::ray::{Hit, Ray};
 use rayon::prelude::*;
 
@@ -40,8 +42,7 @@ pub struct Scene {
     pub environment: Option<Environment>,
     /// What next events are made to.
     pub lights: Lights,
-    /// From where it is seen.
-    pub view: View,
+    views: Views,
     aggregate: Aggregate,
     coverage: SceneCoverage,
 }
@@ -55,18 +56,29 @@ enum SceneCoverage {
 
 impl Scene {
     /// Builds the trees, a mesh a thread, and gathers the lights.
-    pub fn new(data: SceneData, environment: Option<Environment>, view: View) -> Result<Self, BuildError> {
-        let trees = (data.meshes.par_iter())
-            .map(|mesh| MeshTree::build(&mesh.positions, &mesh.triangles))
-            .collect::<Result<Vec<_>, _>>()?;
+    pub fn new(data: SceneData, environment: Option<Environment>, views: Views) -> Result<Self, BuildError> {
+        let trees = data.meshes.par_iter().map(Mesh::tree).collect::<Result<Vec<_>, _>>()?;
         let placements: Vec<Placement> = (data.instances.iter())
             .map(|i| Placement { mesh: i.mesh.0, to_world: i.placement.to_world() })
             .collect();
-        let aggregate = Aggregate::build(trees, &placements)?;
+        let aggregate = Aggregate::moving(trees, &placements, |i| data.instances[i].placement.knots())?;
         let opaque = data.materials.iter().all(|m| m.coverage == Coverage::Opaque);
         let coverage = if opaque { SceneCoverage::Opaque } else { SceneCoverage::Partly };
         let lights = Lights::new(&data, environment.as_ref());
-        Ok(Self { data, environment, lights, view, aggregate, coverage })
+        Ok(Self { data, environment, lights, views, aggregate, coverage })
+    }
+
+    /// When a sample is taken: at the share of the shutter's time that `share` tells, which is not asked where nothing
+    /// moves.
+    #[inline]
+    pub fn moment(&self, share: impl FnOnce() -> f32) -> Moment {
+        if self.data.knots.is_still() { Moment::STILL } else { self.data.knots.moment(share()) }
+    }
+
+    /// From where it is seen at a moment.
+    #[inline]
+    pub fn view(&self, moment: Moment) -> View {
+        self.views.at(moment)
     }
 
     /// The nearest surface on a ray. A surface of partial coverage is there with the probability of its alpha,

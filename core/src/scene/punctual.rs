@@ -1,6 +1,7 @@
 //! Lights without extent, as `KHR_lights_punctual` has them.
 
 use crate::math::colour::Rgb;
+use crate::trace::moment::Moment;
 use glam::Vec3;
 
 /// A light without extent.
@@ -8,8 +9,23 @@ use glam::Vec3;
 pub struct Punctual {
     /// Name of its node, or its own where the node has none.
     pub name: String,
-    /// Where and how it shines.
+    /// Where and how it shines; of one that moves, at the first knot.
     pub kind: PunctualKind,
+    /// Where it is and which way it shines at each knot; empty of one that stands.
+    pub knots: Vec<(Vec3, Vec3)>,
+}
+
+impl Punctual {
+    /// Where and how it shines at a moment. Between knots its place goes straight, its direction along the chord.
+    pub fn at(&self, moment: Moment) -> PunctualKind {
+        if self.knots.is_empty() {
+            return self.kind;
+        }
+        let [a, b] = moment.ends(&self.knots);
+        let position = moment.vector(a.0, b.0);
+        let direction = moment.vector(a.1, b.1).try_normalize().unwrap_or(a.1);
+        self.kind.moved(position, direction)
+    }
 }
 
 /// Where and how a light without extent shines, in the scene's space. Radiant intensities are per
@@ -47,6 +63,18 @@ pub enum PunctualKind {
 }
 
 impl PunctualKind {
+    /// The same light elsewhere; `direction` has unit length.
+    #[must_use]
+    fn moved(self, to: Vec3, direction: Vec3) -> Self {
+        match self {
+            Self::Point { intensity, .. } => Self::Point { position: to, intensity },
+            Self::Spot { intensity, inner_cos, outer_cos, .. } => {
+                Self::Spot { position: to, direction, intensity, inner_cos, outer_cos }
+            }
+            Self::Directional { irradiance, .. } => Self::Directional { direction, irradiance },
+        }
+    }
+
     /// Share of a spot's intensity at an angle of this cosine to its axis, as `KHR_lights_punctual`
     /// recommends: the square of a linear ramp in the cosine.
     pub fn cone(inner_cos: f32, outer_cos: f32, cos: f32) -> f32 {

@@ -2,12 +2,13 @@
 
 use crate::film::size::Size;
 use crate::math::warp;
-use crate::scene::camera::{Camera, Projection};
+use crate::scene::camera::{Camera, Projection, Stand};
+use crate::trace::moment::Moment;
 use crate::trace::ray::Ray;
 use glam::{Vec2, Vec3};
 
 /// A camera with a frame to fill and a lens.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct View {
     pub(super) position: Vec3,
     /// To the right edge, the top edge and the middle of the frame, from the eye (of an orthographic camera: the
@@ -42,15 +43,20 @@ pub struct LensInScene {
 
 impl View {
     /// Fills a frame of `size`. The vertical angle of view is the camera's; the horizontal one follows from the
-    /// frame. An orthographic camera ignores the lens.
+    /// frame. An orthographic camera ignores the lens. A camera that moves is taken where it is at the first knot.
     pub fn new(camera: &Camera, size: Size, lens: Option<LensInScene>) -> Self {
+        Self::from(camera.stand(), camera.projection, size, lens)
+    }
+
+    fn from(stand: Stand, projection: Projection, size: Size, lens: Option<LensInScene>) -> Self {
+        let Stand { position, axes: [right, up, backward] } = stand;
         let aspect = size.width as f32 / size.height as f32;
-        let (half_width, half_height, projection) = match camera.projection {
+        let (half_width, half_height, projection) = match projection {
             Projection::Perspective { tan_half_y, .. } => {
                 let projection = lens.map_or(ViewProjection::Pinhole, |lens| ViewProjection::Lens {
                     radius: lens.radius,
                     focus_distance: lens.focus_distance,
-                    across: [camera.right, camera.up],
+                    across: [right, up],
                 });
                 (tan_half_y * aspect, tan_half_y, projection)
             }
@@ -59,10 +65,10 @@ impl View {
             }
         };
         Self {
-            position: camera.position,
-            right: camera.right * half_width,
-            up: camera.up * half_height,
-            forward: -camera.backward,
+            position,
+            right: right * half_width,
+            up: up * half_height,
+            forward: -backward,
             projection,
             size: Vec2::new(size.width as f32, size.height as f32),
         }
@@ -82,6 +88,33 @@ impl View {
                 Ray::new(self.position + on_lens, (in_focus - on_lens).normalize())
             }
             ViewProjection::Orthographic => Ray::new(self.position + off, self.forward),
+        }
+    }
+}
+
+/// A camera with a frame and a lens, at all moments of the shutter.
+#[derive(Clone, Debug)]
+pub struct Views {
+    first: View,
+    /// What the views of a camera that moves are made of.
+    moving: Option<(Camera, Size, Option<LensInScene>)>,
+}
+
+impl Views {
+    /// Those of a camera.
+    pub fn new(camera: &Camera, size: Size, lens: Option<LensInScene>) -> Self {
+        let moving = (!camera.knots.is_empty()).then(|| (camera.clone(), size, lens));
+        Self { first: View::new(camera, size, lens), moving }
+    }
+
+    /// What is seen at a moment.
+    #[inline]
+    pub fn at(&self, moment: Moment) -> View {
+        match &self.moving {
+            None => self.first,
+            Some((camera, size, lens)) => {
+                View::from(camera.stand_at(moment), camera.projection, *size, *lens)
+            }
         }
     }
 }

@@ -194,7 +194,7 @@ fn compare(meshes: &[Mesh], placements: &[Placement], rays: usize, random: &mut 
         let direction = target - origin;
         let length = [1.0, 1e-3, 1e5][random.below(3)];
         let t_max = if random.uniform() < 0.5 { f32::INFINITY } else { random.uniform() / length };
-        let ray = Ray { origin, direction: direction * length, t_max };
+        let ray = Ray { t_max, ..Ray::new(origin, direction * length) };
         let hits = all_hits(meshes, &placed, &ray);
         check::<Native>(&placed, &ray, &hits);
         check::<Portable>(&placed, &ray, &hits);
@@ -401,7 +401,7 @@ fn cube_rooms_do_not_leak() {
 fn what_is_not_a_ray_hits_nothing() {
     let placed = Mesh::sphere(2).alone();
     let answer = |origin: Vec3, direction: Vec3, t_max: f32| {
-        let ray = Ray { origin, direction, t_max };
+        let ray = Ray { t_max, ..Ray::new(origin, direction) };
         let hit = placed.closest(&ray, |_| true);
         assert_eq!(hit.is_some(), placed.occluded(&ray, |_| true));
         assert_eq!(hit.is_some(), placed.transmittance(&ray, |_| 0.0) == 0.0);

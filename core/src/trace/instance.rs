@@ -21,9 +21,14 @@ pub struct Instance {
     pub mesh: u32,
     /// From the mesh's space to the world's.
     pub to_world: Affine3A,
-    /// `None` where `to_world` is the identity.
+    /// `None` where `to_world` is the identity and stays so.
     pub moved: Option<Moved>,
+    /// Its number among those that move, or [`STANDS`].
+    pub(super) motion: u32,
 }
+
+/// No motion has this number.
+pub(super) const STANDS: u32 = u32::MAX;
 
 /// What follows from a transform that is not the identity. Matrices are rows.
 #[derive(Clone, Copy, Debug)]
@@ -44,7 +49,29 @@ impl Instance {
     pub(super) fn new(placement: Placement) -> Option<Self> {
         let Placement { mesh, to_world } = placement;
         let moved = if to_world == Affine3A::IDENTITY { None } else { Some(Moved::new(to_world)?) };
-        Some(Self { mesh, to_world, moved })
+        Some(Self { mesh, to_world, moved, motion: STANDS })
+    }
+
+    /// What goes from transform to transform, of which `first` is one and `motion` its number among those that move.
+    pub(super) fn moving(mesh: u32, first: Affine3A, motion: u32) -> Option<Self> {
+        Some(Self { mesh, to_world: first, moved: Some(Moved::new(first)?), motion })
+    }
+
+    /// The box around the mesh's box on its way along the transforms of `knots`, rounded outward; `None` where it leaves
+    /// 2⁶⁰ or a transform cannot be inverted.
+    pub(super) fn bounds_on(knots: &[Affine3A], mesh: Bounds) -> Option<Bounds> {
+        if mesh.is_empty() {
+            return Some(mesh);
+        }
+        let mut all = Bounds::EMPTY;
+        for &knot in knots {
+            all = all.union(Moved::new(knot)?.bounds(mesh));
+        }
+        // Halfway between knots the inverse may be larger than at them, and so its rounding, which is 2⁻²² of the way
+        // from the origin at a knot.
+        let room = Vec3::splat(all.reach() * (1.0 / (1 << 19) as f32));
+        let all = Bounds { min: all.min - room, max: all.max + room };
+        (all.reach() <= LARGEST_COORDINATE).then_some(all)
     }
 
     /// The box around the mesh's box in the world, rounded outward; `None` where it leaves 2⁶⁰.
@@ -117,7 +144,8 @@ impl Moved {
         self.mirrored
     }
 
-    fn bounds(&self, mesh: Bounds) -> Bounds {
+    /// The box around the mesh's box, rounded outward.
+    pub(super) fn bounds(&self, mesh: Bounds) -> Bounds {
         let (mut min, mut max) = (Vec3::ZERO, Vec3::ZERO);
         for axis in 0..3 {
             let row = self.linear[axis].as_dvec3();

@@ -4,9 +4,11 @@ use super::bounds::Bounds;
 use super::build_error::{BuildError, LARGEST_COORDINATE, check_count};
 use super::collapse;
 use super::lanes::WIDTH;
+use super::moment::Moment;
 use super::triangle::Block;
 use super::wide::Tree;
 use glam::Vec3;
+use rayon::prelude::*;
 
 /// The triangles of a mesh in a tree, ready for rays. Positions are copied into it.
 #[derive(Clone, Debug)]
@@ -15,7 +17,24 @@ pub struct MeshTree {
     /// One for each leaf of the tree.
     pub(super) blocks: Vec<Block>,
     bounds: Bounds,
+    /// What a mesh that changes its shape has instead of `tree` and `blocks`: one for each piece of the motion.
+    pieces: Vec<Piece>,
 }
+
+/// The triangles of a mesh between two knots.
+#[derive(Clone, Debug)]
+pub(super) struct Piece {
+    /// Over boxes that hold the triangles at both knots, and so all between.
+    pub(super) tree: Tree,
+    /// The leaves' triangles at the first knot.
+    pub(super) before: Vec<Block>,
+    /// The same triangles at the second.
+    pub(super) after: Vec<Block>,
+}
+
+/// Room beside the box around two places of a vertex, relative to its largest coordinate, for the rounding of what lies
+/// between: twice that of three operations.
+const ROUNDING: f32 = 6.0 / (1 << 24) as f32;
 
 impl MeshTree {
     /// Builds the tree: about a second a million triangles. No triangles make an empty tree. Triangles without area
@@ -29,7 +48,26 @@ impl MeshTree {
         let corners = |id: &u32| (*id, triangles[*id as usize].map(|v| positions[v as usize]));
         let blocks = leaves.iter().map(|items| Block::new(items.iter().map(corners))).collect();
         let bounds = boxes.iter().fold(Bounds::EMPTY, |all, b| all.union(*b));
-        Ok(Self { tree, blocks, bounds })
+        Ok(Self { tree, blocks, bounds, pieces: Vec::new() })
+    }
+
+    /// The tree of a mesh that changes its shape: `knots` holds its positions at each knot of the scene's motion, at
+    /// least two. A tree for each piece of the motion, each as large as [`MeshTree::build`] makes it and half again.
+    pub fn moving(knots: &[&[Vec3]], triangles: &[[u32; 3]]) -> Result<Self, BuildError> {
+        check_count(triangles.len())?;
+        let pieces = (knots.par_windows(2))
+            .map(|ends| Piece::build([ends[0], ends[1]], triangles))
+            .collect::<Result<Vec<_>, _>>()?;
+        let bounds = pieces.iter().fold(Bounds::EMPTY, |all, piece| all.union(piece.1));
+        let (tree, _) = collapse::build(&[], WIDTH);
+        let pieces = pieces.into_iter().map(|piece| piece.0).collect();
+        Ok(Self { tree, blocks: Vec::new(), bounds, pieces })
+    }
+
+    /// The piece of the motion that a moment falls into; `None` where the mesh keeps its shape.
+    #[inline(always)]
+    pub(super) fn piece(&self, moment: Moment) -> Option<&Piece> {
+        self.pieces.get(moment.piece as usize)
     }
 
     /// The box around all triangles.
@@ -39,7 +77,31 @@ impl MeshTree {
 
     /// Bytes of memory that the tree takes.
     pub fn bytes(&self) -> usize {
-        self.tree.nodes.len() * size_of::<super::wide::Node>() + self.blocks.len() * size_of::<Block>()
+        let of = |tree: &Tree, blocks: usize| {
+            tree.nodes.len() * size_of::<super::wide::Node>() + blocks * size_of::<Block>()
+        };
+        let moving = self.pieces.iter().map(|p| of(&p.tree, p.before.len() + p.after.len()));
+        of(&self.tree, self.blocks.len()) + moving.sum::<usize>()
+    }
+}
+
+impl Piece {
+    fn build(ends: [&[Vec3]; 2], triangles: &[[u32; 3]]) -> Result<(Self, Bounds), BuildError> {
+        let boxes = (triangles.iter().enumerate())
+            .map(|(triangle, corners)| {
+                let [before, after] = ends.map(|positions| vertices(positions, triangle, corners));
+                let around = Bounds::around(before?).union(Bounds::around(after?));
+                let room = Vec3::splat(around.reach() * ROUNDING);
+                Ok(Bounds { min: around.min - room, max: around.max + room })
+            })
+            .collect::<Result<Vec<_>, _>>()?;
+        let (tree, leaves) = collapse::build(&boxes, WIDTH);
+        let [before, after] = ends.map(|positions| {
+            let corners = |id: &u32| (*id, triangles[*id as usize].map(|v| positions[v as usize]));
+            leaves.iter().map(|items| Block::new(items.iter().map(corners))).collect()
+        });
+        let bounds = boxes.iter().fold(Bounds::EMPTY, |all, b| all.union(*b));
+        Ok((Self { tree, before, after }, bounds))
     }
 }
 

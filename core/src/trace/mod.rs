@@ -13,6 +13,7 @@ mod lanes;
 #[cfg(test)]
 mod leaving;
 pub mod mesh;
+pub mod moment;
 mod prepared;
 pub mod ray;
 pub mod surface_point;

@@ -1,5 +1,6 @@
 //! A ray and what it hits.
 
+use super::moment::Moment;
 use glam::{Vec2, Vec3};
 use std::cmp::Ordering;
 
@@ -15,12 +16,20 @@ pub struct Ray {
     pub direction: Vec3,
     /// End of the ray in lengths of `direction`; may be infinite.
     pub t_max: f32,
+    /// When it is on its way: what moves is met where it is then.
+    pub moment: Moment,
 }
 
 impl Ray {
-    /// The ray without an end.
+    /// The ray without an end, at the first moment: the only one of a scene in which nothing moves.
     pub fn new(origin: Vec3, direction: Vec3) -> Self {
-        Self { origin, direction, t_max: f32::INFINITY }
+        Self { origin, direction, t_max: f32::INFINITY, moment: Moment::STILL }
+    }
+
+    /// The same ray at another moment.
+    #[must_use]
+    pub fn at(self, moment: Moment) -> Self {
+        Self { moment, ..self }
     }
 }
 

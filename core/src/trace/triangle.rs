@@ -1,6 +1,7 @@
 //! Blocks of eight triangles, and the watertight test of a ray against one (Woop, Benthin, Wald 2013).
 
 use super::lanes::{Lanes, Row, WIDTH};
+use super::moment::Moment;
 use super::prepared::Prepared;
 use crate::math::robust::UNIT_ROUNDOFF;
 use glam::{DVec3, Vec3};
@@ -38,6 +39,21 @@ impl Block {
                 for (row, coordinate) in rows.iter_mut().zip(vertex.to_array()) {
                     row.0[lane] = coordinate;
                 }
+            }
+        }
+        block
+    }
+
+    /// The block on its way from `before` to `after`, which hold the same triangles. Each coordinate is rounded like
+    /// [`Moment::number`], so that triangles that share a vertex go on sharing it.
+    #[inline(always)]
+    pub(super) fn between<L: Lanes>(before: &Self, after: &Self, moment: Moment) -> Self {
+        let passed = L::splat(moment.passed);
+        let mut block = before.clone();
+        for (rows, ends) in block.vertices.iter_mut().zip(&after.vertices) {
+            for (row, end) in rows.iter_mut().zip(ends) {
+                let start = L::load(row);
+                *row = L::load(end).sub(start).mul_add(passed, start).store();
             }
         }
         block

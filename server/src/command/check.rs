@@ -2,9 +2,15 @@
 
 use super::{exit::Outcome, scene_file, table, terminal, words};
 use clap::Args;
+use ovtigre::farm::reach::line;
 use ovtigre_core::{
     gltf::limits::Limits,
+    path::{
+        expression::language::Language,
+        reach::{Unreachable, unreachable},
+    },
     render::inspect::{Contents, inspect},
+    settings::{FULL, Method},
 };
 use serde::Serialize;
 use std::path::PathBuf;
@@ -26,6 +32,8 @@ struct Document<'a> {
     contents: &'a ovtigre_core::gltf::report::Report,
     needs: &'a [String],
     leaves_out: &'a [String],
+    /// By a render with default flags.
+    unreachable: Vec<Unreachable>,
     warnings: Vec<Warning<'a>>,
 }
 
@@ -54,10 +62,18 @@ fn document(contents: &Contents) -> Document<'_> {
         contents: &contents.report,
         needs: &contents.needs,
         leaves_out: &contents.leaves_out,
+        unreachable: not_made(contents),
         warnings: (contents.warnings.iter())
             .map(|w| Warning { pointer: &w.pointer, detail: &w.detail })
             .collect(),
     }
+}
+
+/// Paths that a render with default flags asks for and does not make.
+fn not_made(contents: &Contents) -> Vec<Unreachable> {
+    let language = Language::compile(&[FULL]).expect("the default is an expression");
+    let around = contents.surroundings(&language.tags().collect::<Vec<_>>());
+    unreachable(&language, Method::Path, &around, None)
 }
 
 fn show(contents: &Contents) {
@@ -88,6 +104,9 @@ fn show(contents: &Contents) {
         ("leaves out", words::list(&contents.leaves_out)),
         ("dropped", dropped),
     ]);
+    for missing in not_made(contents) {
+        terminal::result(&format!("warning: {}", line(&missing)));
+    }
     for warning in &contents.warnings {
         let pointer = if warning.pointer.is_empty() { "/" } else { &warning.pointer };
         terminal::result(&format!("warning: {pointer}: {}", warning.detail));

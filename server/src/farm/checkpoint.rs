@@ -26,7 +26,7 @@ impl Farm {
         let done = |reason: &str| Ending {
             state: JobState::Done,
             reason: Some(reason.to_owned()),
-            certified: reached,
+            certified: reached && !live.spec.settings.method.has_bias(),
             waits: Waits::Not,
         };
         let ending = if reached {

@@ -15,6 +15,7 @@ pub mod live;
 pub mod open;
 pub mod paths;
 pub mod picture;
+pub mod reach;
 pub mod reap;
 pub mod rules;
 pub mod scene;

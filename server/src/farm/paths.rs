@@ -47,8 +47,8 @@ pub struct Chosen {
     pub weights: Weights,
 }
 
-/// Resolves what a request says of paths; tells `note` of each fault and its JSON pointer.
-pub fn choose(request: &JobRequest, note: &mut impl FnMut(&str, String)) -> Chosen {
+/// Resolves what a request says of paths, and their language; tells `note` of each fault and its JSON pointer.
+pub fn choose(request: &JobRequest, note: &mut impl FnMut(&str, String)) -> (Chosen, Option<Language>) {
     let (pointer, paths, gloss) = picture(request, note);
     let method = method(request, note);
     let mut chosen = Chosen {
@@ -63,10 +63,11 @@ pub fn choose(request: &JobRequest, note: &mut impl FnMut(&str, String)) -> Chos
     if chosen.method == Method::Photon && chosen.layers.len() < LAYERS_MAX {
         chosen.layers.push(Layer { name: NARROW.to_owned(), shows: Shows::Narrow });
     }
-    if compile(&chosen, pointer, note).is_some() {
+    let language = compile(&chosen, pointer, note);
+    if language.is_some() {
         fits(request, &chosen, pointer, note);
     }
-    chosen
+    (chosen, language)
 }
 
 /// Where the picture's expression is written, the expression, and what it does to gloss.

@@ -2,6 +2,7 @@
 
 use ovtigre_core::{
     film::{schedule::Schedule, size::Region},
+    path::reach::Unreachable,
     settings::Settings,
 };
 use ovtigre_proto::{id::BlobId, job::JobRequest};
@@ -24,6 +25,9 @@ pub struct JobSpec {
     pub seconds: Option<f64>,
     /// Why the method was chosen.
     pub method_reason: String,
+    /// Paths that are asked for and that no technique of the method makes.
+    #[serde(default)]
+    pub unreachable: Vec<Unreachable>,
     /// What the scene lacked or could not be read, and what was done about it.
     pub warnings: Vec<String>,
 }

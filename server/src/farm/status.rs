@@ -87,6 +87,7 @@ impl Farm {
             method: spec.settings.method.name().to_owned(),
             method_reason: spec.method_reason,
             paths: shown(&spec.settings.paths).to_owned(),
+            unreachable: spec.unreachable,
             layers,
             settings: spec.settings,
             region: spec.region,

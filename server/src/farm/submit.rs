@@ -4,6 +4,7 @@ use super::{
     Farm,
     error::{FarmError, Result, fault},
     paths::choose,
+    reach::{DEFAULT_SKY, line, missing},
     rules::{PARTIAL_BYTES_MAX, Rules},
     spec::JobSpec,
 };
@@ -30,8 +31,6 @@ const REPLICATES_MAX: u32 = 256;
 const NAME_MAX: usize = 200;
 /// Longest idempotency key.
 const KEY_MAX: usize = 255;
-/// What a scene without light needs, as its report names it.
-const DEFAULT_SKY: &str = "default sky";
 /// Width over height where a camera does not say.
 const ASPECT_DEFAULT: f64 = 16.0 / 9.0;
 
@@ -107,7 +106,7 @@ pub fn resolve(
 ) -> std::result::Result<JobSpec, Vec<Fault>> {
     let mut faults = Vec::new();
     let mut note = |pointer: &str, detail: String| faults.push(fault(pointer, detail));
-    let chosen = choose(&request, &mut note);
+    let (chosen, language) = choose(&request, &mut note);
     numbers(&request, &mut note);
     let camera = camera(&request, scene).unwrap_or_else(|detail| {
         note("/camera", detail);
@@ -140,6 +139,11 @@ pub fn resolve(
         return Err(faults);
     }
     let lit = if request.environment.is_some() { Lit::ByRequest } else { Lit::ByScene };
+    let unreachable = language
+        .map(|language| missing(&language, chosen.method, &request, scene, camera, lens))
+        .unwrap_or_default();
+    let mut warnings = warnings(scene, lit, camera, samples, replicates);
+    warnings.extend(unreachable.iter().map(line));
     let spec = JobSpec {
         settings: Settings {
             size,
@@ -163,7 +167,8 @@ pub fn resolve(
         error_target: request.error,
         seconds: request.seconds,
         method_reason: chosen.reason.to_owned(),
-        warnings: warnings(scene, lit, camera, samples, replicates),
+        unreachable,
+        warnings,
         request,
     };
     fits(&spec, rules).map(|()| spec)

@@ -5,6 +5,7 @@ use crate::bsdf::surface::Walls;
 use crate::gltf::load::Loaded;
 use crate::scene::interaction::Side;
 use crate::scene::material::Coverage;
+use crate::trace::moment::Moment;
 use glam::{Vec2, Vec3};
 use serde_json::{Value, json};
 
@@ -29,7 +30,7 @@ fn textured(material: Value) -> Builder {
 }
 
 fn base_color(loaded: &Loaded, u: f32, v: f32) -> Vec3 {
-    loaded.scene.interaction(0, 0, Vec2::new(u, v)).surface().base_color
+    loaded.scene.interaction(0, 0, Vec2::new(u, v), Moment::STILL).surface().base_color
 }
 
 #[test]
@@ -38,7 +39,7 @@ fn base_colour_is_decoded_from_srgb_and_other_channels_are_not() {
         "baseColorTexture": {"index": 0}, "metallicRoughnessTexture": {"index": 0},
         "metallicFactor": 0.5, "roughnessFactor": 0.5, "baseColorFactor": [1, 1, 0.5, 1]}}))
     .load();
-    let surface = loaded.scene.interaction(0, 0, Vec2::new(0.75, 0.1)).surface();
+    let surface = loaded.scene.interaction(0, 0, Vec2::new(0.75, 0.1), Moment::STILL).surface();
     assert!((surface.base_color - Vec3::new(1.0, 0.215_860_5, 0.0)).length() < 1e-6, "{surface:?}");
     assert!((surface.roughness - 0.5 * 128.0 / 255.0).abs() < 1e-6 && surface.metallic == 0.0);
     // One picture in memory, looked up in two ways.
@@ -107,13 +108,13 @@ fn emission_is_factor_times_strength_on_the_sides_that_emit() {
     };
     let single = textured(material(false)).load();
     assert_eq!(single.report.emissive_triangles, 1);
-    let interaction = single.scene.interaction(0, 0, Vec2::new(0.75, 0.1));
+    let interaction = single.scene.interaction(0, 0, Vec2::new(0.75, 0.1), Moment::STILL);
     let expected = Vec3::new(10.0, 5.0 * 0.215_860_5, 0.0);
     assert!((interaction.emission(Side::Front) - expected).length() < 1e-5);
     assert_eq!(interaction.emission(Side::Back), Vec3::ZERO);
     assert_eq!((interaction.side(Vec3::Z), interaction.side(Vec3::NEG_Z)), (Side::Front, Side::Back));
     let double = textured(material(true)).load().scene;
-    let back = double.interaction(0, 0, Vec2::new(0.75, 0.1)).emission(Side::Back);
+    let back = double.interaction(0, 0, Vec2::new(0.75, 0.1), Moment::STILL).emission(Side::Back);
     assert!((back - expected).length() < 1e-5);
 }
 
@@ -126,7 +127,7 @@ fn extensions_of_the_dielectric_are_read() {
         "KHR_materials_volume": {"thicknessFactor": 0.1, "attenuationColor": [0.5, 1, 0.25], "attenuationDistance": 2}
     }}))
     .load();
-    let surface = loaded.scene.interaction(0, 0, Vec2::new(0.75, 0.1)).surface();
+    let surface = loaded.scene.interaction(0, 0, Vec2::new(0.75, 0.1), Moment::STILL).surface();
     assert_eq!((surface.ior, surface.transmission, surface.walls), (1.33, 0.75, Walls::Solid));
     assert!((surface.specular - 0.5 * 128.0 / 255.0).abs() < 1e-6);
     assert_eq!(surface.specular_color, Vec3::new(2.0, 1.0, 0.0));
@@ -161,7 +162,7 @@ fn specular_glossiness_becomes_a_coloured_dielectric() {
         "diffuseFactor": [0.5, 0.5, 0.5, 1], "specularFactor": [0.2, 0.4, 0.8], "glossinessFactor": 0.5,
         "specularGlossinessTexture": {"index": 0}}}}));
     builder.json["extensionsRequired"] = json!(["KHR_materials_pbrSpecularGlossiness"]);
-    let surface = builder.load().scene.interaction(0, 0, Vec2::new(0.75, 0.1)).surface();
+    let surface = builder.load().scene.interaction(0, 0, Vec2::new(0.75, 0.1), Moment::STILL).surface();
     assert_eq!((surface.metallic, surface.base_color), (0.0, Vec3::splat(0.5)));
     assert!((surface.roughness - (1.0 - 0.5 * 128.0 / 255.0)).abs() < 1e-6);
     let f0 = surface.specular_color * 0.04;
@@ -189,18 +190,18 @@ fn normal_maps_bend_along_the_layout_with_and_without_tangents() {
         let side = if mirrored { -1.0 } else { 1.0 };
         let expected =
             Vec3::new(0.6 * scale as f32 * side, (166.0 / 127.5 - 1.0) * scale as f32, 0.6).normalize();
-        let got = computed.interaction(0, 0, Vec2::splat(0.3)).shading.z;
+        let got = computed.interaction(0, 0, Vec2::splat(0.3), Moment::STILL).shading.z;
         assert!((got - expected).length() < 1e-5, "{got} {expected}");
         let tangent = builder.floats("VEC4", &[side, 0., 0., side].repeat(3));
         builder.json["meshes"][0]["primitives"][0]["attributes"]["TANGENT"] = json!(tangent);
-        let given = builder.load().scene.interaction(0, 0, Vec2::splat(0.3)).shading.z;
+        let given = builder.load().scene.interaction(0, 0, Vec2::splat(0.3), Moment::STILL).shading.z;
         assert!((given - expected).length() < 1e-5, "{given} {expected}");
         // Mirrored in space, the bump is the mirror image.
         builder.json["nodes"][0]["scale"] = json!([-1, 1, 1]);
-        let image = builder.load().scene.interaction(0, 0, Vec2::splat(0.3)).shading.z;
+        let image = builder.load().scene.interaction(0, 0, Vec2::splat(0.3), Moment::STILL).shading.z;
         assert!((image - expected * Vec3::new(-1.0, 1.0, 1.0)).length() < 1e-5, "{image}");
         builder.push("nodes", json!({"mesh": 0, "scale": [-1, 1, 1]}));
-        let instance = builder.load().scene.interaction(1, 0, Vec2::splat(0.3)).shading.z;
+        let instance = builder.load().scene.interaction(1, 0, Vec2::splat(0.3), Moment::STILL).shading.z;
         assert!((instance - expected * Vec3::new(-1.0, 1.0, 1.0)).length() < 1e-5, "{instance}");
     }
 }

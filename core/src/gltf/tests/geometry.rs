@@ -2,13 +2,14 @@
 
 use super::builder::{Builder, F32, I8, I16, TRIANGLE, U8, U16, U32, bytes};
 use crate::scene::data::SceneData;
+use crate::trace::moment::Moment;
 use glam::{DVec3, Vec2, Vec3, Vec4};
 use serde_json::json;
 
 /// Corners of the first instance's triangles, back in the file's space.
 fn triangles(scene: &SceneData) -> Vec<[DVec3; 3]> {
     let count = scene.meshes[0].triangles.len() as u32;
-    (0..count).map(|t| scene.corners(0, t).map(|p| scene.normalisation.restore(p))).collect()
+    (0..count).map(|t| scene.corners(0, t, Moment::STILL).map(|p| scene.normalisation.restore(p))).collect()
 }
 
 fn near(a: &[DVec3; 3], b: &[[f64; 3]; 3]) -> bool {
@@ -118,7 +119,11 @@ fn strips_and_fans_become_triangles_facing_the_same_way() {
         let scene = builder.load().scene;
         assert_eq!(scene.meshes[0].triangles.len(), 2);
         for triangle in 0..2 {
-            assert_eq!(scene.interaction(0, triangle, Vec2::splat(0.3)).ng, Vec3::Z, "mode {mode}");
+            assert_eq!(
+                scene.interaction(0, triangle, Vec2::splat(0.3), Moment::STILL).ng,
+                Vec3::Z,
+                "mode {mode}"
+            );
         }
     }
 }
@@ -154,7 +159,10 @@ fn slivers_keep_their_normal() {
     builder.primitive(&json!({"attributes": {"POSITION": position}}));
     let loaded = builder.load();
     for triangle in 0..loaded.report.triangles as u32 {
-        assert!((loaded.scene.interaction(0, triangle, Vec2::splat(0.3)).ng - Vec3::Z).length() < 1e-6);
+        assert!(
+            (loaded.scene.interaction(0, triangle, Vec2::splat(0.3), Moment::STILL).ng - Vec3::Z).length()
+                < 1e-6
+        );
     }
 }
 
@@ -162,9 +170,9 @@ fn slivers_keep_their_normal() {
 fn missing_normals_are_flat_and_zero_ones_too() {
     let flat = Builder::triangle(&[], json!({})).load().scene;
     assert!(flat.meshes[0].normals.is_empty());
-    assert_eq!(flat.interaction(0, 0, Vec2::splat(0.2)).shading.z, Vec3::Z);
+    assert_eq!(flat.interaction(0, 0, Vec2::splat(0.2), Moment::STILL).shading.z, Vec3::Z);
     let zero = Builder::triangle(&[("NORMAL", "VEC3", &[0.0; 9])], json!({})).load();
-    assert_eq!(zero.scene.interaction(0, 0, Vec2::splat(0.2)).shading.z, Vec3::Z);
+    assert_eq!(zero.scene.interaction(0, 0, Vec2::splat(0.2), Moment::STILL).shading.z, Vec3::Z);
     assert!(zero.warnings.iter().any(|p| p.pointer.ends_with("/NORMAL")));
 }
 
@@ -172,7 +180,7 @@ fn missing_normals_are_flat_and_zero_ones_too() {
 fn normals_on_the_back_are_turned_to_the_front() {
     let normals = [0.6, 0.0, -0.8, 0.6, 0.0, -0.8, 0.6, 0.0, -0.8];
     let scene = Builder::triangle(&[("NORMAL", "VEC3", &normals)], json!({})).load().scene;
-    let interaction = scene.interaction(0, 0, Vec2::splat(0.2));
+    let interaction = scene.interaction(0, 0, Vec2::splat(0.2), Moment::STILL);
     assert_eq!(interaction.ng, Vec3::Z);
     assert!((interaction.shading.z - Vec3::new(-0.6, 0.0, 0.8)).length() < 1e-6);
 }
@@ -180,9 +188,9 @@ fn normals_on_the_back_are_turned_to_the_front() {
 #[test]
 fn colours_of_three_and_four_numbers_multiply_the_base_colour() {
     let rgb = Builder::triangle(&[("COLOR_0", "VEC3", &[0.5; 9])], json!({})).load().scene;
-    assert_eq!(rgb.interaction(0, 0, Vec2::splat(0.2)).surface().base_color, Vec3::splat(0.5));
+    assert_eq!(rgb.interaction(0, 0, Vec2::splat(0.2), Moment::STILL).surface().base_color, Vec3::splat(0.5));
     let rgba = Builder::triangle(&[("COLOR_0", "VEC4", &[0.25; 12])], json!({})).load().scene;
-    assert_eq!(rgba.interaction(0, 0, Vec2::splat(0.2)).at.colour, Vec4::splat(0.25));
+    assert_eq!(rgba.interaction(0, 0, Vec2::splat(0.2), Moment::STILL).at.colour, Vec4::splat(0.25));
     let white = Builder::triangle(&[("COLOR_0", "VEC4", &[1.0; 12])], json!({})).load().scene;
     assert!(white.meshes[0].colours.is_empty());
 }

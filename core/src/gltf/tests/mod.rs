@@ -4,5 +4,6 @@ mod appearance;
 mod builder;
 mod bundles;
 mod geometry;
+mod motion;
 mod placement;
 mod refusals;

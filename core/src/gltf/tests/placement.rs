@@ -5,6 +5,7 @@ use crate::scene::camera::Projection;
 use crate::scene::data::SceneData;
 use crate::scene::instance::Placement;
 use crate::scene::punctual::PunctualKind;
+use crate::trace::moment::Moment;
 use glam::{DVec3, Vec2, Vec3};
 use serde_json::json;
 
@@ -26,7 +27,7 @@ fn a_mesh_at_one_place_is_gathered_and_at_several_instanced() {
     assert_eq!((scene.meshes.len(), scene.instances.len()), (2, 3));
     assert_eq!((loaded.report.triangles, loaded.report.placed_triangles, loaded.report.instances), (2, 3, 3));
     let third = (0..3).find(|&i| scene.node_name(i, 0) == "third").unwrap();
-    let corners = scene.corners(third, 0).map(|p| scene.normalisation.restore(p));
+    let corners = scene.corners(third, 0, Moment::STILL).map(|p| scene.normalisation.restore(p));
     for (corner, expected) in corners.iter().zip([[5.0, 0.0, 0.0], [7.0, 0.0, 0.0], [5.0, 3.0, 0.0]]) {
         assert!((*corner - DVec3::from(expected)).length() < 1e-5, "{corners:?}");
     }
@@ -43,10 +44,10 @@ fn mirroring_keeps_the_front_where_the_file_has_it() {
             builder.push("nodes", json!({"mesh": 0, "translation": [9, 9, 9]}));
         }
         let scene = builder.load().scene;
-        let interaction = scene.interaction(0, 0, Vec2::splat(0.25));
+        let interaction = scene.interaction(0, 0, Vec2::splat(0.25), Moment::STILL);
         assert_eq!(interaction.ng, Vec3::Z, "{instanced}");
         assert!((interaction.shading.z - Vec3::new(-0.6, 0.0, 0.8)).length() < 1e-6, "{instanced}");
-        let [a, b, c] = scene.corners(0, 0);
+        let [a, b, c] = scene.corners(0, 0, Moment::STILL);
         assert!((b - a).cross(c - a).z > 0.0, "{instanced}");
     }
 }
@@ -65,7 +66,7 @@ fn uneven_scale_bends_normals_as_the_surface_bends() {
             builder.push("nodes", json!({"mesh": 0}));
         }
         let scene = builder.load().scene;
-        let interaction = scene.interaction(0, 0, Vec2::splat(0.25));
+        let interaction = scene.interaction(0, 0, Vec2::splat(0.25), Moment::STILL);
         let expected = Vec3::new(-2.0, 1.0, 0.0).normalize();
         let ng = interaction.ng * interaction.ng.dot(expected).signum();
         assert!((ng - expected).length() < 1e-6);
@@ -224,9 +225,9 @@ fn errors_of_points_bound_what_moving_them_rounds() {
     builder.push("nodes", json!({"mesh": 0, "translation": [1000.1, -77.7, 3.3], "rotation": [0.1, 0.2, 0.3, 0.9], "scale": [1.1, 0.3, 2.7]}));
     let scene = builder.load().scene;
     for instance in 0..2 {
-        let corners = scene.corners(instance, 0).map(Vec3::as_dvec3);
+        let corners = scene.corners(instance, 0, Moment::STILL).map(Vec3::as_dvec3);
         for (u, v) in [(0.1, 0.2), (0.9, 0.05), (0.0, 0.0), (0.333, 0.334)] {
-            let interaction = scene.interaction(instance, 0, Vec2::new(u, v));
+            let interaction = scene.interaction(instance, 0, Vec2::new(u, v), Moment::STILL);
             let (u, v) = (f64::from(u), f64::from(v));
             let exact = corners[0] * (1.0 - u - v) + corners[1] * u + corners[2] * v;
             let off = (interaction.position.as_dvec3() - exact).abs();

@@ -4,6 +4,7 @@ use super::builder::{Builder, F32, TRIANGLE, U16, bytes, png};
 use crate::gltf::bundle::Bundle;
 use crate::gltf::limits::Limits;
 use crate::gltf::load::load;
+use crate::trace::moment::Moment;
 use serde_json::{Value, json};
 
 /// Refused after `change`, with all of `says` in one line.
@@ -257,7 +258,8 @@ fn no_flipped_byte_panics() {
                 && let Ok(loaded) = load(&bundle, &Limits::default())
             {
                 for instance in 0..loaded.scene.instances.len() as u32 {
-                    let interaction = loaded.scene.interaction(instance, 0, glam::Vec2::splat(0.3));
+                    let interaction =
+                        loaded.scene.interaction(instance, 0, glam::Vec2::splat(0.3), Moment::STILL);
                     assert!(interaction.position.is_finite() && interaction.surface().base_color.is_finite());
                     assert!(interaction.shading.z.dot(interaction.ng) > 0.0, "{at} {flip}");
                 }

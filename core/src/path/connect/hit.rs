@@ -40,7 +40,14 @@ pub fn hit_environment<S: Throughput<EyeState>, L: Throughput<LightState>>(
     if radiance == Vec3::ZERO {
         return;
     }
-    let emission = scene.lights.emission_density(&scene.data, Some(environment), light, direction, 1.0);
+    let emission = scene.lights.emission_density(
+        &scene.data,
+        Some(environment),
+        walk.edge.ray.moment,
+        light,
+        direction,
+        1.0,
+    );
     // Parallel rays all meet the same point of the sky: no other technique does.
     let next_event = match walk.edge.kind {
         EdgeKind::Directions => f64::from(emission.origin),
@@ -67,7 +74,7 @@ pub fn hit_surface<S: Throughput<EyeState>, L: Throughput<LightState>>(
     }
     let cos = direction.dot(at.ng).abs();
     let squared = walk.squared(at.position);
-    let emission = scene.lights.emission_density(&scene.data, None, light, direction, cos);
+    let emission = scene.lights.emission_density(&scene.data, None, at.moment, light, direction, cos);
     let next_event = if walk.scatterings == 0 {
         f64::from(emission.origin)
     } else {

@@ -30,7 +30,7 @@ pub fn to_lens<E: Throughput<EyeState>, L: Throughput<LightState>>(
         return;
     }
     let lens = walk.sampler.pair(walk.dimension(Use::Lens));
-    let Some(seen) = scene.view.see(vertex.at.position, lens) else { return };
+    let Some(seen) = walk.view().see(vertex.at.position, lens) else { return };
     let (value, backward) = vertex.evaluate(seen.direction, Transport::Importance);
     let light = walk.carried.scattered(&rules.language, Weight::Smooth(value));
     if light.is_dead() || light.total() == Vec3::ZERO {
@@ -66,7 +66,7 @@ impl LensEnd {
         squared: f64,
         pdf: f32,
     ) -> Self {
-        let cos = f64::from(walk.scene.view.axis().dot(seen.direction).abs());
+        let cos = f64::from(walk.view().axis().dot(seen.direction).abs());
         Self {
             from_eye: seen.pdf.over_area(squared, f64::from(vertex.cos(seen.direction))),
             from_light: f64::from(pdf) * cos / squared,
@@ -163,7 +163,7 @@ pub fn hit_lens<E: Throughput<EyeState>, L: Throughput<LightState>>(
     if !chosen.uses(technique.0, technique.1) {
         return;
     }
-    let Some(hit) = walk.scene.view.meet(&walk.edge.ray, t_max) else { return };
+    let Some(hit) = walk.view().meet(&walk.edge.ray, t_max) else { return };
     let LensHit { pixel, t, position, cos, place_pdf, direction_pdf } = hit;
     let squared = walk.squared(position);
     let forward = walk.edge.density.over_solid_angle() * cos / squared;

@@ -32,8 +32,8 @@ pub fn next_event<S: Throughput<EyeState>, L: Throughput<LightState>>(
     let (scene, rules) = (walk.scene, walk.rules);
     let choice = walk.sampler.pair(walk.dimension(Use::Light)).x;
     let place = walk.sampler.pair(walk.dimension(Use::LightPoint));
-    let point = vertex.at.position;
-    let sampled = scene.lights.sample(&scene.data, scene.environment.as_ref(), point, choice, place);
+    let (point, moment) = (vertex.at.position, vertex.at.moment);
+    let sampled = scene.lights.sample(&scene.data, scene.environment.as_ref(), moment, point, choice, place);
     let Some((light, event)) = sampled else { return };
     let Some(start) = rules.language.light_start(rules.tag(light)) else { return };
     let (value, bsdf_pdf) = vertex.evaluate(event.direction, Transport::Radiance);
@@ -140,7 +140,14 @@ impl Around {
     ) -> Self {
         let scene = walk.scene;
         let (lights, environment) = (&scene.lights, scene.environment.as_ref());
-        let emission = lights.emission_density(&scene.data, environment, light, event.direction, event.cos);
+        let emission = lights.emission_density(
+            &scene.data,
+            environment,
+            vertex.at.moment,
+            light,
+            event.direction,
+            event.cos,
+        );
         let cos = f64::from(vertex.cos(event.direction));
         let squared = match event.end {
             ShadowEnd::Point(end) => f64::from((end - vertex.at.position).length_squared()),

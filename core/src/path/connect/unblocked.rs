@@ -13,7 +13,7 @@ use glam::Vec3;
 pub fn between(scene: &Scene, vertex: &Vertex<'_>, media: &Media, end: Vec3, tally: &mut Tally) -> Rgb {
     let towards = end - vertex.at.position;
     let origin = vertex.leave(towards);
-    let ray = Ray { origin, direction: end - origin, t_max: 1.0 };
+    let ray = Ray { origin, direction: end - origin, t_max: 1.0, moment: vertex.at.moment };
     let passes = along(scene, &ray, tally);
     if passes == 0.0 {
         return Vec3::ZERO;

@@ -204,6 +204,11 @@ impl Language {
         self.light_starts.len()
     }
 
+    /// The tags that lights can have.
+    pub fn tags(&self) -> impl Iterator<Item = LightTag> + use<> {
+        (0..self.light_starts.len() as u16).map(LightTag)
+    }
+
     /// The names that the expressions use.
     pub fn light_names(&self) -> &[String] {
         &self.names

@@ -6,6 +6,7 @@ use crate::path::tally::Tally;
 use crate::path::throughput::Carriage;
 use crate::sampler::Sampler;
 use crate::scene::Scene;
+use crate::trace::moment::Moment;
 use glam::Vec3;
 
 /// Light that arrived at a surface.
@@ -27,7 +28,7 @@ pub struct Photon<T> {
 pub fn photons<'a, C: Carriage>(
     scene: &'a Scene,
     rules: &'a Rules,
-    sampler: &'a Sampler,
+    sampler: (&'a Sampler, Moment),
     tally: &mut Tally,
 ) -> Vec<Photon<C::Light>> {
     let vertices = from_light::<C>(scene, rules, sampler, Keeps::Vertices, tally);

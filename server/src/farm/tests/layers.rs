@@ -95,7 +95,7 @@ async fn each_fault_is_told_with_its_place() {
             (r.strategies, r.method) = (Some("1".into()), Some(MethodRequest::Bidirectional));
         }),
         ("/weights", "need method 'bidirectional'", |r| r.weights = Some(WeightsRequest::Power)),
-        ("/method", "'photon' is not supported yet", |r| r.method = Some(MethodRequest::Photon)),
+        ("/layers/0", "a picture has that already", |r| r.layers = layers(&["narrow=LDE"])),
         ("/shadows", "only by method 'path'", |r| {
             (r.shadows, r.method) = (Some(Shadows::Off), Some(MethodRequest::Light));
         }),
@@ -136,7 +136,7 @@ async fn a_method_that_splats_is_never_cut() {
     };
     let path = check(MethodRequest::Path, &[]).await.unwrap();
     assert!(path.schedule().regions().len() > 1);
-    for method in [MethodRequest::Light, MethodRequest::Bidirectional] {
+    for method in [MethodRequest::Light, MethodRequest::Bidirectional, MethodRequest::Photon] {
         let spec = check(method, &["direct=LDE"]).await.unwrap();
         assert_eq!(spec.schedule().regions(), [spec.region]);
     }

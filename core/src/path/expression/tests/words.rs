@@ -1,26 +1,39 @@
 //! Automata against the plain matcher: every word, every place to join two subpaths.
 
 use super::matcher::{Token, matches};
-use crate::bsdf::event::Letter;
+use crate::bsdf::event::{Letter, Letters};
 use crate::path::expression::language::{Language, LightTag, Rules};
 use crate::path::expression::parse::parse;
 use crate::path::expression::presets::PRESETS;
 use crate::path::expression::syntax::Node;
 
-/// Longest words that are tried.
+/// Longest words of natural letters that are tried.
 const LONGEST: usize = 7;
+/// Longest words of all letters that are tried.
+const LONGEST_OF_ALL: usize = 5;
 
 /// Names that lights go by in the tests: none, one, two.
 const LIGHTS: [&[&str]; 4] = [&[], &["sun"], &["lamp", "brass"], &["sun", "lamp"]];
 
 /// Words of letters up to a length, from the eye to the light.
-fn words(longest: usize) -> impl Iterator<Item = Vec<Letter>> {
-    let count = |length: usize| Letter::COUNT.pow(length as u32);
-    (0..=longest).flat_map(move |length| {
-        (0..count(length)).map(move |number| {
-            (0..length).map(|place| Letter::ALL[number / count(place) % Letter::COUNT]).collect()
-        })
-    })
+fn words(letters: Letters, longest: usize) -> Vec<Vec<Letter>> {
+    let mut all = vec![Vec::new()];
+    let mut longer = 0..1;
+    for _ in 0..longest {
+        let words = all[longer.clone()].to_vec();
+        let next = words.iter().flat_map(|word| letters.iter().map(|letter| [&word[..], &[letter]].concat()));
+        longer = all.len()..all.len();
+        all.extend(next);
+        longer.end = all.len();
+    }
+    all
+}
+
+/// All words of natural letters, and the shorter ones of all.
+fn words_up_to(longest: usize) -> Vec<Vec<Letter>> {
+    let of_all = words(Letters::ALL, longest.min(LONGEST_OF_ALL));
+    let twins = of_all.into_iter().filter(|word| word.contains(&Letter::Mirrored));
+    words(Letters::NATURAL, longest).into_iter().chain(twins).collect()
 }
 
 fn judged(trees: &[Node], light: &[&str], word: &[Letter]) -> Vec<usize> {
@@ -51,7 +64,7 @@ fn compare(rules: &[&str], lights: &[&[&str]], longest: usize) -> usize {
     let mut taken = 0;
     for light in lights {
         let tag = language.tag_of(light);
-        for word in words(longest) {
+        for word in words_up_to(longest) {
             let judged = judged(&trees, light, &word);
             taken += usize::from(!judged.is_empty());
             for eye in 0..=word.len() {
@@ -103,7 +116,7 @@ fn presets_take_the_words_that_a_plain_matcher_takes() {
 fn without_gloss_the_whitted_preset_is_the_lecture_s_expression() {
     let preset = PRESETS.iter().find(|p| p.name == "whitted").unwrap();
     let [shown, paths] = [preset.shown, preset.paths].map(|text| Language::compile(&[text]).unwrap());
-    for word in words(LONGEST).filter(|word| !word.contains(&Letter::Mirrored)) {
+    for word in words(Letters::NATURAL, LONGEST) {
         let [a, b] = [&shown, &paths].map(|language| language.accepts_word(LightTag::UNNAMED, &word));
         assert_eq!(a, b, "{word:?}");
     }
@@ -140,17 +153,20 @@ fn a_dead_state_is_one_from_which_no_word_is_completed() {
     let language = Language::compile(&rules).unwrap();
     let takes = |tag, word: &[Letter]| !language.accepts_word(tag, word).is_empty();
     let tags = [&[][..], &["sun"]].map(|names| language.tag_of(names));
-    for word in words(4) {
+    for word in words(Letters::NATURAL, 4) {
         let state = word.iter().try_fold(language.eye_start(), |s, letter| language.eye_next(s, *letter));
-        let completed = words(3).any(|rest| tags.iter().any(|tag| takes(*tag, &[&word[..], &rest].concat())));
+        let completed = words(Letters::NATURAL, 3)
+            .iter()
+            .any(|rest| tags.iter().any(|tag| takes(*tag, &[&word[..], rest].concat())));
         assert_eq!(state.is_some(), completed, "{word:?}");
     }
     for tag in tags {
-        for word in words(4) {
+        for word in words(Letters::NATURAL, 4) {
             let state = word.iter().rev().fold(language.light_start(tag), |state, letter| {
                 state.and_then(|state| language.light_next(state, *letter))
             });
-            let completed = words(3).any(|rest| takes(tag, &[&rest[..], &word].concat()));
+            let completed =
+                words(Letters::NATURAL, 3).iter().any(|rest| takes(tag, &[&rest[..], &word].concat()));
             assert_eq!(state.is_some(), completed, "{word:?} from the light");
         }
     }

@@ -1,0 +1,67 @@
+//! Which asked paths a job's picture will not have.
+
+use ovtigre_core::{
+    bsdf::event::{Letter, Letters},
+    path::{
+        expression::language::Language,
+        reach::{EyeKind, LightKind, Surroundings, Unreachable, unreachable},
+    },
+    settings::{CameraChoice, Lens, Method},
+};
+use ovtigre_proto::{job::JobRequest, scene::SceneContents};
+
+/// What a scene without light needs, as its report names it.
+pub const DEFAULT_SKY: &str = ovtigre_core::render::inspect::DEFAULT_SKY;
+
+/// Paths of `language` that `method` does not make of a scene as it is asked for.
+pub fn missing(
+    language: &Language,
+    method: Method,
+    request: &JobRequest,
+    scene: &SceneContents,
+    camera: CameraChoice,
+    lens: Option<Lens>,
+) -> Vec<Unreachable> {
+    let sky = request.environment.is_some() || scene.needs.iter().any(|need| need == DEFAULT_SKY);
+    let lights = scene.lights;
+    let kinds = [
+        (LightKind::Surface, lights.emissive_triangles > 0),
+        (LightKind::Environment, sky),
+        (LightKind::Punctual, lights.point + lights.spot + lights.directional > 0),
+    ];
+    let parallel = match camera {
+        CameraChoice::Framed => false,
+        CameraChoice::Index(n) => scene.camera_rays_parallel.get(n as usize) == Some(&true),
+    };
+    let letter = |name: &String| Letter::ALL.into_iter().find(|letter| letter.symbol() == name);
+    let letters = scene.letters.iter().filter_map(letter).map(Letters::of);
+    // Which light has which name is not known here: each may have any.
+    let there = kinds.into_iter().filter(|(_, there)| *there);
+    let around = Surroundings {
+        letters: letters.fold(Letters::NONE, Letters::union),
+        lights: there.flat_map(|(kind, _)| language.tags().map(move |tag| (kind, tag))).collect(),
+        eye: match lens {
+            Some(_) => EyeKind::Lens,
+            None if parallel => EyeKind::Parallel,
+            None => EyeKind::Pinhole,
+        },
+    };
+    unreachable(language, method, &around, request.bounces)
+}
+
+/// One line of it for people.
+pub fn line(missing: &Unreachable) -> String {
+    let Unreachable { light, paths, why, reached_by } = missing;
+    let from = match light {
+        LightKind::Surface => "emissive surfaces",
+        LightKind::Environment => "the environment",
+        LightKind::Punctual => "points, spots and suns",
+    };
+    let methods: Vec<&str> = reached_by.iter().map(|method| method.name()).collect();
+    let instead = match &methods[..] {
+        [] => "no method makes them".to_owned(),
+        some => format!("method {} makes them", some.join(" or ")),
+    };
+    let shown: Vec<&str> = paths.iter().take(3).map(String::as_str).collect();
+    format!("paths such as {} from {from} are not in the picture: {why}; {instead}", shown.join(", "))
+}
