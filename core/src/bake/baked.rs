@@ -82,7 +82,7 @@ pub fn bake(
     let root = writer.push("nodes", root);
     let report = solution.report();
     let extras = json!({"ovtigre": {
-        "method": "radiosity", "paths": "LD*E", "white": white, "patches": report.patches,
+        "method": report.method, "paths": "LD*E", "white": white, "patches": report.patches,
         "iterations": report.iterations, "residual": report.residuals.last(), "certified": report.certified,
     }});
     let glb = writer.finish(root, &[UNLIT], &extras).ok_or(BakeError::TooLong)?;

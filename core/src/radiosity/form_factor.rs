@@ -9,8 +9,10 @@ use crate::math::colour::Rgb;
 use crate::math::warp;
 use crate::radiosity::element::Element;
 use crate::radiosity::hemisphere::{Numbers, Surroundings};
+use crate::radiosity::patch::Patch;
 use crate::radiosity::reflectance;
 use crate::sampler::{Dimension, Sampler, Use};
+use crate::scene::data::SceneData;
 use crate::trace::moment::Moment;
 use core::f32::consts::FRAC_1_PI;
 use glam::{DVec3, Vec3};
@@ -90,6 +92,21 @@ fn row(surroundings: &Surroundings<'_>, element: Element, count: u32) -> Row {
     }
     let reflectance = (reflected / reflected_weight).as_vec3();
     Row { direct: direct / covered, reflectance, links: added(met, covered), rays }
+}
+
+/// Share of an element that is there, and its mean reflectance, without tracing a ray.
+pub fn look_at(data: &SceneData, patch: &Patch) -> (f64, Rgb) {
+    let (mut covered, mut reflected) = (0.0, DVec3::ZERO);
+    for index in 0..REFLECTANCE_POINTS {
+        let sampler = Sampler::new(0, REPLICATE, [patch.triangle, patch.instance], index);
+        let place = patch.on_triangle(warp::triangle(sampler.pair(Dimension::Eye(0, Use::Choice))));
+        let at = data.interaction(patch.instance, patch.triangle, place, Moment::STILL);
+        let alpha = f64::from(at.alpha());
+        covered += alpha;
+        reflected += reflectance::mean(&Bsdf::from_surface(&at.surface())).as_dvec3() * alpha;
+    }
+    let reflectance = if covered > 0.0 { (reflected / covered).as_vec3() } else { Rgb::ZERO };
+    (covered / f64::from(REFLECTANCE_POINTS), reflectance)
 }
 
 /// One link for each sender, the shares over the whole.

@@ -12,6 +12,7 @@ pub mod fineness;
 pub mod form_factor;
 pub mod hemisphere;
 pub mod interpolate;
+pub mod particles;
 pub mod patch;
 pub mod refine;
 pub mod reflectance;

@@ -5,9 +5,11 @@ use serde::{Deserialize, Serialize};
 /// How a solution was found.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RadiosityReport {
+    /// `radiosity` for equations, `light` for particles from the lights.
+    pub method: String,
     /// Patches; each has two sides, which are the elements.
     pub patches: usize,
-    /// Pairs of elements that see each other.
+    /// Pairs of elements that see each other; none for particles.
     pub links: usize,
     /// Rays that were traced, those of coarser patches before included.
     pub rays: u64,

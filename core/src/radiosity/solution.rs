@@ -3,9 +3,10 @@
 use crate::math::colour::Rgb;
 use crate::radiosity::element::Element;
 use crate::radiosity::fineness::Fineness;
-use crate::radiosity::form_factor::{Row, rows};
+use crate::radiosity::form_factor::{Row, look_at, rows};
 use crate::radiosity::hemisphere::{Sources, Surroundings};
 use crate::radiosity::interpolate::Vertices;
+use crate::radiosity::particles::land;
 use crate::radiosity::patch::{Patch, Patches};
 use crate::radiosity::refine;
 use crate::radiosity::report::RadiosityReport;
@@ -13,6 +14,7 @@ use crate::radiosity::solve::{Solved, Until, solve};
 use crate::scene::Scene;
 use crate::settings::Shadows;
 use glam::{DVec3, Vec2};
+use rayon::prelude::*;
 
 /// Most triangles that are taken.
 const TRIANGLES_MAX: usize = 1 << 21;
@@ -53,11 +55,7 @@ impl Solution {
         scatterings: Option<u32>,
         fineness: Fineness,
     ) -> Result<Self, TooManyTriangles> {
-        let placed = scene.data.instances.iter().map(|i| scene.data.meshes[i.mesh.index()].triangles.len());
-        let triangles: usize = placed.sum();
-        if triangles > TRIANGLES_MAX {
-            return Err(TooManyTriangles(triangles));
-        }
+        check_size(scene)?;
         let mut patches = Patches::even(&scene.data, fineness.even);
         let sources = Sources::of(scene, &patches);
         let until = |error| scatterings.map_or(Until::Error(error), Until::Scatterings);
@@ -85,19 +83,53 @@ impl Solution {
         rays += rows.iter().map(|row| row.rays).sum::<u64>();
         let solved = solve(&rows, &areas(&patches), until(ERROR));
         let report = report(&patches, &rows, &solved, rays, refinements);
-        Ok(Self::put_together(patches, vertices, sources, &rows, &solved.arriving, report))
+        let reflectances = rows.iter().map(|row| row.reflectance).collect();
+        Ok(Self::put_together(patches, vertices, sources, reflectances, &solved.arriving, report))
+    }
+
+    /// By `count` particles from the lights instead of equations, on at most `patches` patches (or triangles, where there are
+    /// more) of one size.
+    pub fn by_particles(
+        scene: &Scene,
+        count: u64,
+        scatterings: Option<u32>,
+        patches: usize,
+    ) -> Result<Self, TooManyTriangles> {
+        check_size(scene)?;
+        let patches = Patches::even(&scene.data, patches);
+        let landed = land(scene, &patches, count, scatterings);
+        let looks: Vec<_> = patches.all().par_iter().map(|patch| look_at(&scene.data, patch)).collect();
+        let arriving: Vec<DVec3> = (landed.flux.iter().enumerate())
+            .map(|(e, flux)| {
+                let area = patches.all()[e / 2].area() * looks[e / 2].0;
+                if area > 0.0 { *flux / area } else { DVec3::ZERO }
+            })
+            .collect();
+        let vertices = Vertices::new(&scene.data, &patches);
+        let report = RadiosityReport {
+            method: "light".to_owned(),
+            patches: patches.all().len(),
+            links: 0,
+            rays: landed.rays,
+            refinements: 0,
+            iterations: 0,
+            residuals: Vec::new(),
+            certified: false,
+        };
+        let reflectances = looks.iter().flat_map(|look| [look.1, look.1]).collect();
+        let sources = Sources::of(scene, &patches);
+        Ok(Self::put_together(patches, vertices, sources, reflectances, &arriving, report))
     }
 
     fn put_together(
         patches: Patches,
         vertices: Vertices,
         sources: Sources,
-        rows: &[Row],
+        reflectances: Vec<Rgb>,
         arriving: &[DVec3],
         report: RadiosityReport,
     ) -> Self {
         let at_vertices = vertices.values(&patches, arriving);
-        let reflectances = rows.iter().map(|row| row.reflectance).collect();
         let arriving = arriving.iter().map(|h| h.as_vec3()).collect();
         Self { patches, vertices, sources, reflectances, arriving, at_vertices, report }
     }
@@ -163,6 +195,12 @@ impl Solution {
     }
 }
 
+fn check_size(scene: &Scene) -> Result<(), TooManyTriangles> {
+    let placed = scene.data.instances.iter().map(|i| scene.data.meshes[i.mesh.index()].triangles.len());
+    let triangles: usize = placed.sum();
+    if triangles > TRIANGLES_MAX { Err(TooManyTriangles(triangles)) } else { Ok(()) }
+}
+
 /// Of the elements.
 fn areas(patches: &Patches) -> Vec<f64> {
     patches.all().iter().map(Patch::area).flat_map(|area| [area, area]).collect()
@@ -170,6 +208,7 @@ fn areas(patches: &Patches) -> Vec<f64> {
 
 fn report(patches: &Patches, rows: &[Row], solved: &Solved, rays: u64, refinements: u32) -> RadiosityReport {
     RadiosityReport {
+        method: "radiosity".to_owned(),
         patches: patches.all().len(),
         links: rows.iter().map(|row| row.links.len()).sum(),
         rays,

@@ -49,7 +49,7 @@ impl Sampling<'_> {
                 tally.planes[0] +=
                     radiosity::sample(scene, solution, settings, how, pixel, &eye, &mut tally.rays);
             }
-            other => unreachable!("{} is refused when a job is submitted", other.name()),
+            Method::Photon => unreachable!("photons are gathered in passes, not sample by sample"),
         }
     }
 

@@ -32,9 +32,12 @@ pub(crate) struct Bake {
     /// Scene to write; a light map is written beside it, too, as .exr.
     #[arg(short, long, value_name = "OUT.glb")]
     output: PathBuf,
-    /// How light is found; by finite elements is the only way so far.
-    #[arg(long, value_name = "METHOD", default_value = "radiosity", value_parser = ["radiosity"])]
-    method: String,
+    /// How light is found: by finite elements, or by particles from the lights.
+    #[arg(long, value_name = "METHOD", default_value = "radiosity")]
+    method: MethodName,
+    /// Particles that method light sends.
+    #[arg(long, value_name = "N", default_value_t = 16_777_216, value_parser = clap::value_parser!(u64).range(1..=1 << 40))]
+    particles: u64,
     /// Write light as colours of vertices or as a texture with a second set of coordinates.
     #[arg(long = "as", value_name = "FORM", default_value = "vertex-colors")]
     form: FormName,
@@ -65,6 +68,15 @@ pub(crate) struct Bake {
     /// Write how the light was found, with the residual of every iteration, to this file.
     #[arg(long, value_name = "FILE.json")]
     report: Option<PathBuf>,
+}
+
+/// How light is found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum MethodName {
+    /// Finite elements.
+    Radiosity,
+    /// Particles from the lights.
+    Light,
 }
 
 /// What light is written as.
@@ -105,16 +117,22 @@ impl Bake {
             open(bytes, image.as_deref(), &settings).map_err(|e| scene_file::fault(&self.scene, &e))?;
         let most = self.patches as usize;
         let fineness = Fineness { even: (most / 4).max(1), most, ..Fineness::default() };
-        let solution = Solution::new(&scene, Shadows::On, self.bounces, fineness)
-            .map_err(|e| scene_file::fault(&self.scene, &e))?;
+        let solution = match self.method {
+            MethodName::Radiosity => Solution::new(&scene, Shadows::On, self.bounces, fineness),
+            MethodName::Light => Solution::by_particles(&scene, self.particles, self.bounces, most),
+        };
+        let solution = solution.map_err(|e| scene_file::fault(&self.scene, &e))?;
         let report = solution.report();
-        terminal::remark(&format!(
-            "solved: {} patches, {} iterations, residual {:.1e}, {}",
-            report.patches,
-            report.iterations,
-            report.residuals.last().copied().unwrap_or(0.0),
-            words::duration(start.elapsed().as_secs_f64())
-        ));
+        let found = match self.method {
+            MethodName::Radiosity => format!(
+                "{} iterations, residual {:.1e}",
+                report.iterations,
+                report.residuals.last().copied().unwrap_or(0.0)
+            ),
+            MethodName::Light => format!("{} particles", self.particles),
+        };
+        let seconds = words::duration(start.elapsed().as_secs_f64());
+        terminal::remark(&format!("solved: {} patches, {found}, {seconds}", report.patches));
         let form = match self.form {
             FormName::VertexColors => Form::VertexColours,
             FormName::LightMap => Form::LightMap(self.size),
