@@ -30,6 +30,10 @@ pub struct LayerError {
     pub rms_error: Option<f64>,
     /// As of the picture, by the layer's own luminance.
     pub relative_error: Option<f64>,
+    /// Of the layer `narrow` of photons: how far the picture's mean luminance is from that of radius zero, as a share of it,
+    /// by extrapolation from the two radii. Negative where light is missing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub estimated_bias: Option<f64>,
 }
 
 /// The whole curve of a job.

@@ -7,7 +7,10 @@ use super::{
     live::{Ending, Live, Waits},
 };
 use crate::store::row::NewCheckpoint;
-use ovtigre_core::film::error::{ErrorEstimate, PlaneSummary, estimate, summarise};
+use ovtigre_core::{
+    film::error::{ErrorEstimate, PlaneSummary, estimate, summarise},
+    settings::Shows,
+};
 use ovtigre_proto::{
     curve::{CurveRow, LayerError},
     status::JobState,
@@ -90,6 +93,8 @@ struct Measured {
 async fn measure(live: &Live, held: Held) -> Result<(Held, Measured)> {
     let region = live.spec.region;
     let planes = live.spec.settings.planes() as usize;
+    let narrow = live.spec.settings.layers.iter().position(|layer| layer.shows == Shows::Narrow);
+    let narrow = narrow.map(|layer| layer + 1);
     blocking(move || {
         let merge = held.as_ref().expect("loaded by the caller");
         let found = estimate(region, &merge.prefixes, merge.checkpoints + 1);
@@ -98,7 +103,11 @@ async fn measure(live: &Live, held: Held) -> Result<(Held, Measured)> {
             relative_upper: e.relative_upper.filter(|upper| upper.is_finite()),
             ..e
         });
-        let layers = (1..planes).map(|plane| layer_error(&summarise(region, &merge.prefixes, plane)));
+        let of = |plane| summarise(region, &merge.prefixes, plane);
+        let layers = (1..planes).map(|plane| LayerError {
+            estimated_bias: (narrow == Some(plane)).then(|| bias(&of(0), &of(plane))).flatten(),
+            ..layer_error(&of(plane))
+        });
         let measured = Measured { picture: found, layers: layers.collect() };
         (held, measured)
     })
@@ -111,7 +120,16 @@ fn layer_error(summary: &PlaneSummary) -> LayerError {
         mean_luminance: summary.mean_luminance,
         rms_error: finite(summary.rms),
         relative_error: finite(summary.relative),
+        estimated_bias: None,
     }
+}
+
+/// What a picture of photons lacks around edges is in proportion to the radius of gathering: from the means at a radius and
+/// at that of half the area follows the mean at radius zero.
+fn bias(wide: &PlaneSummary, narrow: &PlaneSummary) -> Option<f64> {
+    let (wide, narrow) = (wide.mean_luminance, narrow.mean_luminance);
+    let at_zero = wide + (narrow - wide) / (1.0 - 0.5_f64.sqrt());
+    Some((wide - at_zero) / at_zero).filter(|bias| bias.is_finite())
 }
 
 /// Whether any light was found. A picture that is black so far has no spread, and no proof either.

@@ -260,7 +260,12 @@ async fn curves_and_snapshots_are_kept(store: &dyn Store) {
     };
     let progress = Progress { batches: 4, ..Progress::default() };
     let second = CurveRow { samples: 8, ..row };
-    let layer = LayerError { mean_luminance: 0.5, rms_error: Some(0.1), relative_error: None };
+    let layer = LayerError {
+        mean_luminance: 0.5,
+        rms_error: Some(0.1),
+        relative_error: None,
+        estimated_bias: Some(-0.01),
+    };
     let checkpoint =
         |look, row, layers: &[LayerError]| NewCheckpoint { look, row, layers: layers.to_vec(), progress };
     assert_eq!(store.layers(&job).await.unwrap(), []);
