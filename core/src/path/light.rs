@@ -172,7 +172,20 @@ fn show<C: Carriage>(
     if passes > 0.0 {
         let place = f64::from(origin.pdf);
         let radiance: Rgb = radiance / origin.pdf;
-        let shown = Shown { seen, radiance, place, squared, cos, passes, state };
+        let environment = scene.environment.as_ref();
+        let towards = -seen.direction;
+        let emission = scene.lights.emission_density(
+            &scene.data,
+            environment,
+            moment,
+            origin.light,
+            towards,
+            cos as f32,
+        );
+        let cos_lens = f64::from(view.axis().dot(towards).abs());
+        let onto_lens = f64::from(emission.emission) * cos_lens / squared;
+        let lens = view.lens_pdf();
+        let shown = Shown { seen, radiance, place, squared, cos, onto_lens, lens, passes, state };
         light_to_lens::<C::Eye, C::Light>(rules, &shown, tally);
     }
 }
