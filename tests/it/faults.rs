@@ -11,12 +11,18 @@ use ovtigre_tests::{
 };
 use std::{fs, path::Path};
 
+/// Samples a pixel, all four replicates together.
 const SAMPLES: u32 = 256;
 
-/// What `core` alone says of the room at 96×54: the channels of the picture, of its layers and of their errors.
-fn undisturbed(settings: &Settings) -> Layers {
-    let picture = rendered(&room(), settings, SAMPLES / 4).picture();
-    let mut layers = Layers { width: 96, height: 54, ..Layers::default() };
+fn plain() -> Settings {
+    settings(96, 54, 4)
+}
+
+/// What `core` alone says of the room: the channels of the picture, of its layers and of their errors.
+fn undisturbed(settings: &Settings, samples: u32) -> Layers {
+    let picture = rendered(&room(), settings, samples / 4).picture();
+    let [width, height] = [picture.size.width, picture.size.height].map(|side| side as usize);
+    let mut layers = Layers { width, height, ..Layers::default() };
     let prefixes = [String::new()].into_iter().chain(settings.layers.iter().map(|l| format!("{}.", l.name)));
     for (plane, prefix) in prefixes.enumerate() {
         for (c, name) in ["R", "G", "B"].into_iter().enumerate() {
@@ -28,12 +34,12 @@ fn undisturbed(settings: &Settings) -> Layers {
     layers
 }
 
-fn submit(farm: &Farm, folder: &Path, further: &[&str]) -> String {
+fn submit(farm: &Farm, folder: &Path, settings: &Settings, samples: u32, further: &[&str]) -> String {
     let scene = folder.join("room.glb");
     fs::write(&scene, room()).unwrap();
-    let samples = SAMPLES.to_string();
-    let path = scene.to_str().unwrap();
-    let arguments = ["submit", path, "--size", "96x54", "--samples", &samples];
+    let size = format!("{}x{}", settings.size.width, settings.size.height);
+    let (path, samples) = (scene.to_str().unwrap(), samples.to_string());
+    let arguments = ["submit", path, "--size", &size, "--samples", &samples];
     farm.client(&[&arguments, further].concat()).trim().to_owned()
 }
 
@@ -48,10 +54,10 @@ fn batches(job: &serde_json::Value) -> u64 {
 }
 
 /// Kills a worker in the middle of a job, lets two others finish it, and asserts that its picture is that of core alone.
-fn assert_worker_may_die(settings: &Settings, further: &[&str]) {
+fn assert_worker_may_die(settings: &Settings, samples: u32, further: &[&str]) {
     let folder = tempfile::tempdir().unwrap();
     let farm = Farm::start(&folder.path().join("farm"));
-    let job = submit(&farm, folder.path(), further);
+    let job = submit(&farm, folder.path(), settings, samples, further);
     let first = farm.worker();
     let then = farm.wait(&job, |j| batches(j) > 0);
     assert_eq!(then["state"], "running", "the job was over before anything could go wrong: {then}");
@@ -61,7 +67,7 @@ fn assert_worker_may_die(settings: &Settings, further: &[&str]) {
     assert_eq!(done["invalid_samples"], 0);
     let picture = fetch(&farm, &job, folder.path());
     assert!(
-        picture.channels == undisturbed(settings).channels,
+        picture.channels == undisturbed(settings, samples).channels,
         "the picture differs from that of core alone"
     );
     assert_eq!(picture.attributes["ovtigre.job"], job);
@@ -69,19 +75,19 @@ fn assert_worker_may_die(settings: &Settings, further: &[&str]) {
 
 #[test]
 fn a_killed_worker_and_a_late_one_change_no_byte() {
-    assert_worker_may_die(&settings(96, 54, 4), &[]);
+    assert_worker_may_die(&plain(), SAMPLES, &[]);
 }
 
 #[test]
 fn a_killed_worker_changes_no_byte_of_light_that_any_sample_can_add_to() {
-    let mut settings = settings(96, 54, 4);
+    let mut settings = settings(48, 27, 4);
     settings.method = Method::Bidirectional;
     settings.layers = vec![
         Layer { name: "b2".to_owned(), shows: Shows::Paths("L.{2}E".to_owned()) },
         Layer { name: "C21".to_owned(), shows: Shows::Strategy(Strategy { s: 2, t: 1 }) },
     ];
     let further = ["--method", "bidirectional", "--layer", "b2=L.{2}E", "--layer", "C21=(2,1)"];
-    assert_worker_may_die(&settings, &further);
+    assert_worker_may_die(&settings, 128, &further);
 }
 
 #[test]
@@ -89,7 +95,7 @@ fn a_killed_farm_goes_on_where_it_was() {
     let folder = tempfile::tempdir().unwrap();
     let data = folder.path().join("farm");
     let farm = Farm::start(&data);
-    let job = submit(&farm, folder.path(), &[]);
+    let job = submit(&farm, folder.path(), &plain(), SAMPLES, &[]);
     let worker = farm.worker();
     let before = farm.wait(&job, |j| batches(j) > 1);
     farm.kill();
@@ -101,7 +107,7 @@ fn a_killed_farm_goes_on_where_it_was() {
     farm.wait(&job, |j| j["state"] == "done");
     let picture = fetch(&farm, &job, folder.path());
     assert!(
-        picture.channels == undisturbed(&settings(96, 54, 4)).channels,
+        picture.channels == undisturbed(&plain(), SAMPLES).channels,
         "the picture differs from that of core alone"
     );
 }

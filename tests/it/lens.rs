@@ -105,15 +105,8 @@ fn through(aperture: f64) -> Settings {
 fn what_is_out_of_focus_is_a_disk_and_keeps_its_light() {
     for distance in [1.2, 5.0] {
         for aperture in [0.1, 0.25] {
-            let picture = rendered(&square(side(distance), distance), &through(aperture), 64);
-            assert_blur(
-                &picture,
-                aperture,
-                side,
-                distance,
-                0.003,
-                &format!("{distance} m, lens {aperture} m"),
-            );
+            let picture = rendered(&square(side(distance), distance), &through(aperture), 128);
+            assert_blur(&picture, aperture, distance, 0.005, &format!("{distance} m, lens {aperture} m"));
         }
     }
 }
