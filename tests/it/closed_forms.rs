@@ -3,6 +3,7 @@
 use glam::{DVec3, Vec3};
 use ovtigre_tests::{
     glb::Glb,
+    irradiance,
     picture::{in_environment, rendered, settings},
     scenes::{body_alone, cuboid, flipped, furnace, glass, lambert, mirror, over_floor, quad, sphere},
 };
@@ -33,20 +34,6 @@ fn bodies_that_lose_nothing_cannot_be_seen_in_a_uniform_environment() {
     }
 }
 
-/// Irradiance at the origin of the plane y = 0 from a polygon of radiance one above it (Lambert 1760):
-/// E = ½ Σ θᵢ (vᵢ × vᵢ₊₁)/|…| · n.
-fn polygon_irradiance(corners: &[DVec3]) -> f64 {
-    let edges = corners.iter().zip(corners.iter().cycle().skip(1));
-    let sum: f64 = edges
-        .map(|(a, b)| {
-            let (a, b) = (a.normalize(), b.normalize());
-            let across = a.cross(b);
-            across.length().atan2(a.dot(b)) * across.normalize_or_zero().y
-        })
-        .sum();
-    0.5 * sum.abs()
-}
-
 #[test]
 fn a_rectangle_lights_a_floor_as_lambert_says() {
     let rectangle = |x: f32, y: f32, z: f32, half: f32| {
@@ -73,7 +60,7 @@ fn a_rectangle_lights_a_floor_as_lambert_says() {
             let mesh = glb.mesh(&positions, &triangles, light);
             glb.place(mesh);
         });
-        let truth = 3.0 * 0.5 / PI * polygon_irradiance(&corners.map(Vec3::as_dvec3));
+        let truth = 3.0 * 0.5 / PI * irradiance::of_polygon(&corners.map(Vec3::as_dvec3));
         rendered(&glb, &settings(4, 4, 16), 256).assert_mean(truth, 0.002, name);
     }
 }
@@ -123,12 +110,7 @@ fn a_glass_plate_passes_what_fresnel_says() {
         let (sin, cos) = degrees.to_radians().sin_cos();
         let eye = DVec3::new(sin, cos, 0.0).as_vec3() * 2.0;
         glb.orthographic(eye, Vec3::ZERO, 0.01, 0.01);
-        let inside = (1.0 - (sin / 1.5).powi(2)).sqrt();
-        let (s, p) =
-            ((cos - 1.5 * inside) / (cos + 1.5 * inside), (1.5 * cos - inside) / (1.5 * cos + inside));
-        let (s, p) = (s * s, p * p);
-        // Light is not tracked by polarisation: the plate reflects the mean of both at each surface.
-        let reflected = 0.5 * (s + p);
+        let reflected = irradiance::fresnel(1.5, cos);
         let truth = 2.0 * (1.0 - reflected) / (1.0 + reflected);
         rendered(&glb.finish(), &settings(8, 8, 16), 256).assert_mean(truth, 0.002, &format!("{degrees}°"));
     }

@@ -1,6 +1,9 @@
 //! Processes die; the picture does not change.
 
-use ovtigre_core::film::exr::{Layers, read_layers};
+use ovtigre_core::{
+    film::exr::{Layers, read_layers},
+    settings::{Layer, Method, Settings, Shows, Strategy},
+};
 use ovtigre_tests::{
     picture::{rendered, settings},
     program::Farm,
@@ -8,26 +11,36 @@ use ovtigre_tests::{
 };
 use std::{fs, path::Path};
 
+/// Samples a pixel, all four replicates together.
 const SAMPLES: u32 = 256;
 
-/// What `core` alone says of the room at 96×54: the picture's channels and its error's.
-fn undisturbed() -> Layers {
-    let picture = rendered(&room(), &settings(96, 54, 4), SAMPLES / 4).picture();
-    let error = picture.errors.first().expect("four replicates");
-    let mut layers = Layers { width: 96, height: 54, ..Layers::default() };
-    for (c, name) in ["R", "G", "B"].into_iter().enumerate() {
-        layers.channels.insert(name.to_owned(), picture.planes[0].iter().map(|p| p[c]).collect());
-        layers.channels.insert(format!("error.{name}"), error.iter().map(|p| p[c]).collect());
+fn plain() -> Settings {
+    settings(96, 54, 4)
+}
+
+/// What `core` alone says of the room: the channels of the picture, of its layers and of their errors.
+fn undisturbed(settings: &Settings, samples: u32) -> Layers {
+    let picture = rendered(&room(), settings, samples / 4).picture();
+    let [width, height] = [picture.size.width, picture.size.height].map(|side| side as usize);
+    let mut layers = Layers { width, height, ..Layers::default() };
+    let prefixes = [String::new()].into_iter().chain(settings.layers.iter().map(|l| format!("{}.", l.name)));
+    for (plane, prefix) in prefixes.enumerate() {
+        for (c, name) in ["R", "G", "B"].into_iter().enumerate() {
+            let channel = |of: &[[f32; 3]]| of.iter().map(|p| p[c]).collect();
+            layers.channels.insert(format!("{prefix}{name}"), channel(&picture.planes[plane]));
+            layers.channels.insert(format!("{prefix}error.{name}"), channel(&picture.errors[plane]));
+        }
     }
     layers
 }
 
-fn submit(farm: &Farm, folder: &Path) -> String {
+fn submit(farm: &Farm, folder: &Path, settings: &Settings, samples: u32, further: &[&str]) -> String {
     let scene = folder.join("room.glb");
     fs::write(&scene, room()).unwrap();
-    let samples = SAMPLES.to_string();
-    let path = scene.to_str().unwrap();
-    farm.client(&["submit", path, "--size", "96x54", "--samples", &samples]).trim().to_owned()
+    let size = format!("{}x{}", settings.size.width, settings.size.height);
+    let (path, samples) = (scene.to_str().unwrap(), samples.to_string());
+    let arguments = ["submit", path, "--size", &size, "--samples", &samples];
+    farm.client(&[&arguments, further].concat()).trim().to_owned()
 }
 
 fn fetch(farm: &Farm, job: &str, folder: &Path) -> Layers {
@@ -40,11 +53,11 @@ fn batches(job: &serde_json::Value) -> u64 {
     job["batches_done"].as_u64().unwrap()
 }
 
-#[test]
-fn a_killed_worker_and_a_late_one_change_no_byte() {
+/// Kills a worker in the middle of a job, lets two others finish it, and asserts that its picture is that of core alone.
+fn assert_worker_may_die(settings: &Settings, samples: u32, further: &[&str]) {
     let folder = tempfile::tempdir().unwrap();
     let farm = Farm::start(&folder.path().join("farm"));
-    let job = submit(&farm, folder.path());
+    let job = submit(&farm, folder.path(), settings, samples, further);
     let first = farm.worker();
     let then = farm.wait(&job, |j| batches(j) > 0);
     assert_eq!(then["state"], "running", "the job was over before anything could go wrong: {then}");
@@ -53,8 +66,28 @@ fn a_killed_worker_and_a_late_one_change_no_byte() {
     let done = farm.wait(&job, |j| j["state"] == "done");
     assert_eq!(done["invalid_samples"], 0);
     let picture = fetch(&farm, &job, folder.path());
-    assert!(picture.channels == undisturbed().channels, "the picture differs from that of core alone");
+    assert!(
+        picture.channels == undisturbed(settings, samples).channels,
+        "the picture differs from that of core alone"
+    );
     assert_eq!(picture.attributes["ovtigre.job"], job);
+}
+
+#[test]
+fn a_killed_worker_and_a_late_one_change_no_byte() {
+    assert_worker_may_die(&plain(), SAMPLES, &[]);
+}
+
+#[test]
+fn a_killed_worker_changes_no_byte_of_light_that_any_sample_can_add_to() {
+    let mut settings = settings(48, 27, 4);
+    settings.method = Method::Bidirectional;
+    settings.layers = vec![
+        Layer { name: "b2".to_owned(), shows: Shows::Paths("L.{2}E".to_owned()) },
+        Layer { name: "C21".to_owned(), shows: Shows::Strategy(Strategy { s: 2, t: 1 }) },
+    ];
+    let further = ["--method", "bidirectional", "--layer", "b2=L.{2}E", "--layer", "C21=(2,1)"];
+    assert_worker_may_die(&settings, 128, &further);
 }
 
 #[test]
@@ -62,7 +95,7 @@ fn a_killed_farm_goes_on_where_it_was() {
     let folder = tempfile::tempdir().unwrap();
     let data = folder.path().join("farm");
     let farm = Farm::start(&data);
-    let job = submit(&farm, folder.path());
+    let job = submit(&farm, folder.path(), &plain(), SAMPLES, &[]);
     let worker = farm.worker();
     let before = farm.wait(&job, |j| batches(j) > 1);
     farm.kill();
@@ -73,5 +106,8 @@ fn a_killed_farm_goes_on_where_it_was() {
     let _worker = farm.worker();
     farm.wait(&job, |j| j["state"] == "done");
     let picture = fetch(&farm, &job, folder.path());
-    assert!(picture.channels == undisturbed().channels, "the picture differs from that of core alone");
+    assert!(
+        picture.channels == undisturbed(&plain(), SAMPLES).channels,
+        "the picture differs from that of core alone"
+    );
 }

@@ -3,11 +3,15 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on panics")]
 
 mod bad_input;
+mod caustics;
 mod closed_forms;
+mod expressions;
 mod faults;
+mod lens;
 mod methods;
 mod motion;
 mod radiosity;
 mod same_bits;
 mod techniques;
 mod tidy;
+mod weights;

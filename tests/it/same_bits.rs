@@ -2,9 +2,14 @@
 
 use glam::Vec3;
 use ovtigre_core::{
-    film::{batch::Batch, schedule::Schedule, size::Region, sum::Sum},
+    film::{
+        batch::{Batch, Block},
+        schedule::Schedule,
+        size::Region,
+        sum::Sum,
+    },
     render::{batch::render, progress::Progress},
-    settings::Settings,
+    settings::{Layer, Lens, Method, Settings, Shows, Strategy},
 };
 use ovtigre_tests::{
     glb::Glb,
@@ -51,6 +56,80 @@ fn any_number_of_threads_gives_the_same_bits() {
     assert!(one.planes[0].iter().flatten().sum::<f32>() > 0.0);
     for threads in [2, 3, 8] {
         assert!(one == sum(&glb, &settings, batch, threads), "{threads} threads");
+    }
+}
+
+/// The methods whose samples stay in their pixel, and those whose do not, each by itself and with layers.
+fn methods() -> Vec<(String, Settings)> {
+    let mut plain = in_environment(settings(24, 20, 2), 0.2);
+    plain.lens = Some(Lens { radius: 0.1, focus_distance: 5.0 });
+    let layers = |method: Method| {
+        let paths = ["LDE", "L.{2}E", "L.*SE"].map(|paths| Shows::Paths(paths.to_owned()));
+        let further = match method {
+            Method::Bidirectional => vec![Shows::Strategy(Strategy { s: 2, t: 2 })],
+            Method::Photon => vec![Shows::Narrow],
+            _ => Vec::new(),
+        };
+        let all = paths.into_iter().chain(further).enumerate();
+        all.map(|(i, shows)| Layer { name: format!("l{i}"), shows }).collect()
+    };
+    let each = [Method::Path, Method::Light, Method::Bidirectional, Method::Photon];
+    let both = each.into_iter().flat_map(|method| {
+        let alone = Settings { method, ..plain.clone() };
+        let filtered = Settings { layers: layers(method), ..alone.clone() };
+        [(format!("{method:?}"), alone), (format!("{method:?} with layers"), filtered)]
+    });
+    both.collect()
+}
+
+#[test]
+fn every_method_gives_the_same_bits_on_any_number_of_threads() {
+    let glb = everything(1.0, 0.0);
+    for (what, settings) in methods() {
+        let block = Block { index: 0, start: 0, count: 32 };
+        let batch = Batch { region: settings.size.frame(), replicate: 1, block };
+        let one = sum(&glb, &settings, batch, 1);
+        for (i, plane) in one.planes.iter().enumerate() {
+            assert!(plane.iter().flatten().sum::<f32>() > 0.0, "{what}: plane {i} shows nothing");
+        }
+        for threads in [2, 3, 8] {
+            assert!(one == sum(&glb, &settings, batch, threads), "{what}: {threads} threads");
+        }
+    }
+}
+
+/// Where the samples are cut decides where sums are rounded to the f32 of a batch, and nothing else.
+#[test]
+fn blocks_of_every_method_add_up_to_the_same_sum() {
+    let glb = everything(1.0, 0.0);
+    for (what, settings) in methods() {
+        let scene = scene(&glb, &settings);
+        let cut = |counts: &[u32]| {
+            let mut sums =
+                vec![vec![[0.0_f64; 3]; settings.size.frame().pixels()]; settings.planes() as usize];
+            let (mut start, mut rays) = (0, 0);
+            for (index, &count) in (0..).zip(counts) {
+                let batch = Batch {
+                    region: settings.size.frame(),
+                    replicate: 0,
+                    block: Block { index, start, count },
+                };
+                let sum = render(&scene, &settings, batch, &Progress::new()).unwrap();
+                for (into, value) in
+                    sums.iter_mut().flatten().flatten().zip(sum.planes.iter().flatten().flatten())
+                {
+                    *into += f64::from(*value);
+                }
+                (start, rays) = (start + count, rays + sum.rays);
+            }
+            (sums, rays)
+        };
+        let ((a, rays), (b, others)) = (cut(&[1, 1, 2, 4, 8, 4, 2]), cut(&[16, 4, 2]));
+        assert_eq!(rays, others, "{what}");
+        for (a, b) in a.iter().flatten().flatten().zip(b.iter().flatten().flatten()) {
+            // Each batch rounds by half of 2⁻²³ at most.
+            assert!((a - b).abs() <= 1.2e-7 * a.abs(), "{what}: {a} and {b}");
+        }
     }
 }
 

@@ -102,6 +102,28 @@ fn weighted_techniques_add_up_to_the_terms_of_path_tracing() {
 }
 
 #[test]
+fn light_that_meets_the_lens_can_be_weighed_with_the_rest() {
+    let strategies = techniques(3, 0);
+    let glb = round_furnace(0.6, 1.0);
+    for weights in [Weights::Balance, Weights::Power, Weights::Uniform] {
+        let mut settings = with_lens(16);
+        settings.method = Method::Bidirectional;
+        (settings.weights, settings.bounces) = (weights, Some(3));
+        settings.strategies.clone_from(&strategies);
+        settings.layers = strategies.iter().copied().map(layer).chain((0..4).map(bounce)).collect();
+        let picture = rendered(&glb, &settings, 64);
+        for k in 0..4 {
+            let plane = strategies.len() + 1 + k;
+            let what = format!("{weights:?}, {k} scatterings");
+            assert_plane(&picture, plane, 0.6_f64.powi(k as i32), 0.015, &what);
+        }
+        for (i, Strategy { s, t }) in strategies.iter().enumerate() {
+            assert!(picture.mean_of(i + 1).0 > 0.0, "{weights:?}: s = {s}, t = {t} is not used");
+        }
+    }
+}
+
+#[test]
 fn photons_in_a_closed_sphere_make_the_neumann_series() {
     // A ball around a point of a sphere cuts out a cap of exactly π r², so that gathering has no bias there.
     let mut settings = settings(32, 32, 16);

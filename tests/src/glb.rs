@@ -123,6 +123,13 @@ impl Glb {
         self.node(json!({"mesh": mesh}))
     }
 
+    /// Adds triangles of a material of their own at the origin, and returns their node.
+    pub fn body(&mut self, material: Value, (positions, triangles): (Vec<Vec3>, Vec<[u32; 3]>)) -> usize {
+        let material = self.material(material);
+        let mesh = self.mesh(&positions, &triangles, material);
+        self.place(mesh)
+    }
+
     /// Adds a camera that sees `width` × `height` metres in parallel, from `eye` towards `target`.
     pub fn orthographic(&mut self, eye: Vec3, target: Vec3, width: f32, height: f32) {
         let camera = json!({"type": "orthographic", "orthographic":

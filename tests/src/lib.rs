@@ -1,8 +1,10 @@
 //! What the tests share: scenes made by code, and renders of them without a farm.
 
 pub mod glb;
+pub mod irradiance;
 pub mod picture;
 pub mod program;
 pub mod room;
 pub mod scenes;
 pub mod showcase;
+pub mod stage;

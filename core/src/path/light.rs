@@ -43,8 +43,8 @@ pub enum Keeps {
 impl<'a, C: Carriage> Visitor<'a, LightState, C::Light> for FromLight<'a, C> {
     const TWO_WAY: bool = true;
 
-    fn escapes(&mut self, walk: &Walk<'a, LightState, C::Light>, tally: &mut Tally) {
-        hit_lens::<C::Eye, C::Light>(walk, f32::INFINITY, self.start, tally);
+    fn flies(&mut self, walk: &Walk<'a, LightState, C::Light>, t_max: f32, tally: &mut Tally) {
+        hit_lens::<C::Eye, C::Light>(walk, t_max, self.start, tally);
     }
 
     fn arrives(
@@ -52,12 +52,11 @@ impl<'a, C: Carriage> Visitor<'a, LightState, C::Light> for FromLight<'a, C> {
         walk: &mut Walk<'a, LightState, C::Light>,
         at: &Interaction<'a>,
         _: (u32, u32),
-        tally: &mut Tally,
+        _: &mut Tally,
     ) {
         if walk.scatterings == 0 {
             self.learn(walk, at);
         }
-        hit_lens::<C::Eye, C::Light>(walk, (at.position - walk.edge.ray.origin).length(), self.start, tally);
     }
 
     fn scatters(&mut self, walk: &Walk<'a, LightState, C::Light>, vertex: &Vertex<'a>, tally: &mut Tally) {
@@ -172,7 +171,20 @@ fn show<C: Carriage>(
     if passes > 0.0 {
         let place = f64::from(origin.pdf);
         let radiance: Rgb = radiance / origin.pdf;
-        let shown = Shown { seen, radiance, place, squared, cos, passes, state };
+        let environment = scene.environment.as_ref();
+        let towards = -seen.direction;
+        let emission = scene.lights.emission_density(
+            &scene.data,
+            environment,
+            moment,
+            origin.light,
+            towards,
+            cos as f32,
+        );
+        let cos_lens = f64::from(view.axis().dot(towards).abs());
+        let onto_lens = f64::from(emission.emission) * cos_lens / squared;
+        let lens = view.lens_pdf();
+        let shown = Shown { seen, radiance, place, squared, cos, onto_lens, lens, passes, state };
         light_to_lens::<C::Eye, C::Light>(rules, &shown, tally);
     }
 }

@@ -86,8 +86,11 @@ pub trait Visitor<'a, S: State, T: Throughput<S>> {
     /// Whether weights need the densities of the way back.
     const TWO_WAY: bool;
 
+    /// The ray goes as far as `t_max`; nothing of what it meets there counts yet.
+    fn flies(&mut self, _: &Walk<'a, S, T>, _t_max: f32, _: &mut Tally) {}
+
     /// The ray left the scene.
-    fn escapes(&mut self, walk: &Walk<'a, S, T>, tally: &mut Tally);
+    fn escapes(&mut self, _: &Walk<'a, S, T>, _: &mut Tally) {}
 
     /// The ray met a surface. `walk.partial` counts up to here.
     fn arrives(
@@ -140,6 +143,7 @@ impl<'a, S: State, T: Throughput<S>> Walk<'a, S, T> {
             tally.rays += 1;
             let key = || self.sampler.key(self.dimension(Use::Alpha));
             let Some(hit) = self.scene.closest(&self.edge.ray, key) else {
+                visitor.flies(&self, f32::INFINITY, tally);
                 visitor.escapes(&self, tally);
                 return;
             };
@@ -149,6 +153,7 @@ impl<'a, S: State, T: Throughput<S>> Walk<'a, S, T> {
                 hit.barycentric,
                 self.edge.ray.moment,
             );
+            visitor.flies(&self, (at.position - self.edge.ray.origin).length(), tally);
             self.arrive(&at);
             visitor.arrives(&mut self, &at, (hit.instance, hit.triangle), tally);
             if self.scatterings >= self.rules.bounces || !visitor.goes_on(&self) {

@@ -40,7 +40,7 @@ pub fn hit_environment<S: Throughput<EyeState>, L: Throughput<LightState>>(
     if radiance == Vec3::ZERO {
         return;
     }
-    let emission = scene.lights.emission_density(
+    let mut emission = scene.lights.emission_density(
         &scene.data,
         Some(environment),
         walk.edge.ray.moment,
@@ -48,11 +48,11 @@ pub fn hit_environment<S: Throughput<EyeState>, L: Throughput<LightState>>(
         direction,
         1.0,
     );
-    // Parallel rays all meet the same point of the sky: no other technique does.
-    let next_event = match walk.edge.kind {
-        EdgeKind::Directions => f64::from(emission.origin),
-        EdgeKind::Parallel => 0.0,
-    };
+    if walk.edge.kind == EdgeKind::Parallel {
+        // Parallel rays all meet the same point of the sky: no other technique does.
+        emission.origin = 0.0;
+    }
+    let next_event = f64::from(emission.origin);
     deposit::<S, L>(walk, &Hit { light, radiance, next_event, emission, jacobian: walk.edge.cos }, tally);
 }
 

@@ -112,6 +112,10 @@ pub struct Shown {
     pub squared: f64,
     /// See `squared`.
     pub cos: f64,
+    /// Density over area with which light from there meets the place on the lens.
+    pub onto_lens: f64,
+    /// Density over area with which that place is picked, where a ray can hit it.
+    pub lens: Option<f64>,
     /// What passes.
     pub passes: f32,
     /// Where light starts.
@@ -133,11 +137,11 @@ pub fn light_to_lens<E: Throughput<EyeState>, L: Throughput<LightState>>(
         Weighing::Chosen(chosen) => {
             let light = Link { forward: shown.place, reverse: 0.0, jacobian: 0.0, specular: false };
             let lens = Link { forward: 1.0, ..light };
-            let joint = Joint { light_end: from_eye, ..Joint::default() };
+            let joint = Joint { light_end: from_eye, eye_end: shown.onto_lens, ..Joint::default() };
             let ends = Ends {
                 next_event: shown.place,
                 light_is_hit: true,
-                lens: None,
+                lens: shown.lens,
                 light_paths: rules.light_paths,
             };
             chosen.weight(&whole(&[light], &[lens], joint), &ends, 1)
