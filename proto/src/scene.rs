@@ -18,6 +18,7 @@ pub struct SceneReport {
 /// What kind of file, and what is in it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
+#[expect(clippy::large_enum_variant, reason = "one an upload, and most are scenes")]
 pub enum SceneContent {
     /// A glTF scene.
     Scene(SceneContents),

@@ -134,9 +134,10 @@ fn a_moving_camera_sees_what_a_moving_world_shows() {
     let (world, camera) = (world.picture(), camera.picture());
     let errors = [&world, &camera].map(|p| p.errors[0].clone());
     let (mut off, mut light) = (0.0, 0.0);
-    for i in 0..world.planes[0].len() {
-        let [a, b] = [&world, &camera].map(|p| f64::from(p.planes[0][i][0]));
-        let error = f64::from(errors[0][i][0]).hypot(f64::from(errors[1][i][0]));
+    let pixels = world.planes[0].iter().zip(&camera.planes[0]).zip(errors[0].iter().zip(&errors[1]));
+    for (i, ((a, b), (of_a, of_b))) in pixels.enumerate() {
+        let (a, b) = (f64::from(a[0]), f64::from(b[0]));
+        let error = f64::from(of_a[0]).hypot(f64::from(of_b[0]));
         // Errors are themselves estimates with 15 degrees of freedom, and close to the same random numbers were used.
         assert!((a - b).abs() <= 5.0 * error + 1e-4, "{a} and {b} ± {error} in pixel {i}");
         off += error;

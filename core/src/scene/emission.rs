@@ -29,7 +29,6 @@ pub struct Origin<'a> {
 
 /// Where light starts.
 #[derive(Clone, Copy, Debug)]
-#[expect(clippy::large_enum_variant, reason = "one a subpath, never kept")]
 pub enum Place<'a> {
     /// On a surface.
     Surface(Interaction<'a>),

@@ -96,7 +96,7 @@ impl Path {
     }
 
     /// Density over area of vertex `i` from the light's side.
-    fn from_light(&self, i: usize) -> f64 {
+    fn density_from_light(&self, i: usize) -> f64 {
         if i == 0 {
             return self.place;
         }
@@ -105,7 +105,7 @@ impl Path {
     }
 
     /// Density over area of vertex `i` from the eye's side.
-    fn from_eye(&self, i: usize) -> f64 {
+    fn density_from_eye(&self, i: usize) -> f64 {
         let cos = if i == 0 { self.light_cos() } else { self.vertices[i].cos[1] };
         self.vertices[i + 1].pdf[1] * cos / self.squared(i)
     }
@@ -113,8 +113,8 @@ impl Path {
     fn densities(&self) -> (Vec<PathDensity>, Ends) {
         let last = self.vertices.len() - 1;
         let one = |i: usize| PathDensity {
-            from_light: self.from_light(i),
-            from_eye: if i == last { 1.0 } else { self.from_eye(i) },
+            from_light: self.density_from_light(i),
+            from_eye: if i == last { 1.0 } else { self.density_from_eye(i) },
             specular: self.vertices[i].specular,
         };
         let ends = Ends {
@@ -174,22 +174,22 @@ impl Path {
             return recursive::hit(h, &eye[0], self.next_event, self.place * self.emission);
         }
         if n - s == 1 {
-            let from_eye = self.from_eye(s - 1) / self.light_paths;
+            let from_eye = self.density_from_eye(s - 1) / self.light_paths;
             return recursive::to_lens(h, &light[s - 1], from_eye, v[s - 1].pdf[1]);
         }
         if s == 1 {
             let densities = NextEventDensities {
-                hit: if self.is_hit() { self.from_eye(0) / self.next_event } else { 0.0 },
+                hit: if self.is_hit() { self.density_from_eye(0) / self.next_event } else { 0.0 },
                 picked: self.place / self.next_event,
-                first_edge: self.from_light(1),
+                first_edge: self.density_from_light(1),
                 reverse: v[1].pdf[0],
             };
             return recursive::next_event(h, &eye[1], &densities);
         }
         let bridge = Bridge {
-            onto_light: self.from_eye(s - 1),
+            onto_light: self.density_from_eye(s - 1),
             light_reverse: v[s - 1].pdf[1],
-            onto_eye: self.from_light(s),
+            onto_eye: self.density_from_light(s),
             eye_reverse: v[s].pdf[0],
         };
         recursive::join(h, &light[s - 1], &eye[s], &bridge)
