@@ -2,7 +2,7 @@
 //!
 //! Whether a technique makes a path depends on few things: which scatterings are ideally specular, and whether light and
 //! lens can be hit or joined to. So a path is followed by the language's automaton and by what of it matters to
-//! techniques ([`Course`]), together a graph of few nodes in which the paths that are not made are looked for.
+//! techniques (`Course`), together a graph of few nodes in which the paths that are not made are looked for.
 
 use crate::bsdf::event::{Letter, Letters};
 use crate::path::expression::language::{EyeState, Language, LightTag};

@@ -39,7 +39,7 @@ pub(crate) struct JobFlags {
     /// Stop after this many seconds of run time [default: never].
     #[arg(long, value_name = "S", value_parser = positive)]
     pub(crate) seconds: Option<f64>,
-    /// Path expression: words from the light to the eye of D, S and S_M [default: L(D|S)*E].
+    /// Path expression: words from the light to the eye of `D`, `S` and `S_M` [default: L(D|S)*E].
     #[arg(long, value_name = "EXPR", conflicts_with = "preset", value_parser = paths)]
     pub(crate) paths: Option<String>,
     /// A path expression by its name [default: full].
@@ -158,8 +158,8 @@ fn paths(text: &str) -> Result<String, String> {
         Ok(_) => Ok(text.to_owned()),
         Err(error) => {
             let marked = error.marked();
-            let lines: String = marked.lines().map(|line| format!("\n  {line}")).collect();
-            Err(format!("{error}{lines}"))
+            let lines: Vec<String> = marked.lines().map(|line| format!("  {line}")).collect();
+            Err(format!("{error}\n{}", lines.join("\n")))
         }
     }
 }
