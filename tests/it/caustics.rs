@@ -153,6 +153,36 @@ fn a_plane_mirror_shows_a_second_point_light() {
 }
 
 #[test]
+fn photons_reach_a_caustic_that_is_seen_in_a_mirror() {
+    // From a point to a mirror, to the floor, to the mirror again, to parallel rays: no joint can make that.
+    let (light, slope) = (DVec3::new(0.0, 1.0, 0.0), 0.5_f64);
+    let cos = 1.0 / (1.0 + slope * slope).sqrt();
+    let window = Window { centre: DVec3::new(0.6, 0.0, 0.3), width: 0.4 / cos, height: 0.4 };
+    let eye = DVec3::new(0.6 - slope * (2.0 * MIRROR - 0.2), 0.2, 0.3);
+    let mut glb = Glb::new();
+    glb.body(lambert(REFLECTANCE, 0.0), floor(0.0, 6.0, 0.0, 0.0));
+    glb.body(silver(), flipped(floor(MIRROR as f32, 6.0, 0.0, 0.0)));
+    point(&mut glb, light);
+    glb.orthographic(eye.as_vec3(), (eye + DVec3::new(slope, 1.0, 0.0)).as_vec3(), 0.4, 0.4);
+    let glb = glb.finish();
+    let truth = |p: DVec3| {
+        let towards = mirrored(light) - p;
+        let reflected = irradiance::schlick(F0, towards.y / towards.length());
+        INTENSITY * reflected * irradiance::of_point(towards)
+    };
+    let mean = irradiance::schlick(F0, cos) * window.radiance([0, 0], [1, 1], truth);
+    let photons = rendered(&glb, &by(Method::Photon, "LS_MDS_ME", &settings(64, 64, 16)), 4);
+    let (found, error) = photons.mean();
+    assert!(error < 0.004 * mean, "the error {error} of {found} is too large to find a bias");
+    // As above, ρ² ΔE / 8 is at most 1.4 % of E.
+    assert!((found - mean).abs() <= 0.014 * mean + 4.5 * error, "{found} ± {error}, not {mean}");
+    for method in [Method::Path, Method::Light, Method::Bidirectional] {
+        let (nothing, _) = rendered(&glb, &by(method, "LS_MDS_ME", &settings(4, 4, 16)), 64).mean();
+        assert_eq!(nothing, 0.0, "{method:?}");
+    }
+}
+
+#[test]
 fn a_plane_mirror_shows_a_second_lamp() {
     let window = Window { centre: DVec3::new(1.3, 0.0, 0.2), width: 1.8, height: 1.8 };
     // Its front up, so that the mirror alone is lit; it does not stand between the window and its image.

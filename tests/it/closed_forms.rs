@@ -6,6 +6,7 @@ use ovtigre_tests::{
     irradiance,
     picture::{in_environment, rendered, settings},
     scenes::{body_alone, cuboid, flipped, furnace, glass, lambert, mirror, over_floor, quad, sphere},
+    textures::{UVS, png},
 };
 use serde_json::json;
 use std::f64::consts::PI;
@@ -115,25 +116,6 @@ fn a_glass_plate_passes_what_fresnel_says() {
         rendered(&glb.finish(), &settings(8, 8, 16), 256).assert_mean(truth, 0.002, &format!("{degrees}°"));
     }
 }
-
-/// A PNG of grey levels.
-fn png(width: u32, levels: &[[u8; 4]]) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    let height = levels.len() as u32 / width;
-    let mut encoder = png_encoder(&mut bytes, width, height);
-    encoder.write_image_data(levels.as_flattened()).unwrap();
-    encoder.finish().unwrap();
-    bytes
-}
-
-fn png_encoder(bytes: &mut Vec<u8>, width: u32, height: u32) -> png::Writer<&mut Vec<u8>> {
-    let mut encoder = png::Encoder::new(bytes, width, height);
-    encoder.set_color(png::ColorType::Rgba);
-    encoder.set_depth(png::BitDepth::Eight);
-    encoder.write_header().unwrap()
-}
-
-const UVS: [f32; 8] = [0.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0];
 
 #[test]
 fn a_texture_is_where_it_should_be_and_decoded_as_srgb() {

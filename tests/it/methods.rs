@@ -1,14 +1,15 @@
 //! All methods agree.
 
 use glam::Vec3;
-use ovtigre_core::settings::{Layer, Lens, Method, Settings, Shows};
+use ovtigre_core::settings::{Layer, Lens, Method, Settings, Shows, Shutter};
 use ovtigre_tests::{
     glb::Glb,
     picture::{in_environment, rendered, settings},
-    scenes::{cuboid, glass, lambert},
+    scenes::{cuboid, glass, lambert, quad, sphere},
     stage::{metal, plastic, room, room_in_parallel, smooth_sphere},
+    textures::{UVS, png},
 };
-use serde_json::json;
+use serde_json::{Value, json};
 
 fn by(method: Method, settings: &Settings) -> Settings {
     Settings { method, ..settings.clone() }
@@ -87,6 +88,43 @@ fn lights_of_every_kind() {
         glb.light(json!({"type": "point", "intensity": 1.0}), json!({"translation": [-0.5, 0.0, 0.2]}))
     });
     agree(&both, &sky, [32, 32, 128], 0.003, "sky, lamp and point");
+}
+
+/// A quad whose material has a texture of 4×4 texels in the given place.
+fn textured(glb: &mut Glb, mut material: Value, texels: &[[u8; 4]; 16], place: &str, corners: [Vec3; 4]) {
+    let texture = glb.texture(&png(4, texels), json!({}));
+    material[place] = json!({"index": texture});
+    let material = glb.material(material);
+    let (positions, triangles) = quad(corners);
+    let mesh = glb.mesh_with(&positions, &triangles, material, &[("TEXCOORD_0", &UVS, 2)]);
+    glb.place(mesh);
+}
+
+#[test]
+fn normal_maps_and_textured_lamps() {
+    let at = Vec3::new;
+    let bumps = std::array::from_fn(|i| [96 + 16 * (i as u8 % 5), 88 + 20 * (i as u8 % 4), 215, 255]);
+    let glow = std::array::from_fn(|i| [if i % 3 == 0 { 255 } else { 60 }, 40 + 12 * i as u8, 90, 255]);
+    let glb = room(2.0, |glb| {
+        let raised = [at(-0.9, -0.9, 0.9), at(0.5, -0.9, 0.9), at(0.5, -0.8, -0.6), at(-0.9, -0.8, -0.6)];
+        textured(glb, plastic(0.4), &bumps, "normalTexture", raised);
+        let lamp = [at(0.6, -0.6, -0.9), at(0.95, -0.6, -0.6), at(0.95, 0.4, -0.6), at(0.6, 0.4, -0.9)];
+        textured(glb, lambert(0.2, 6.0), &glow, "emissiveTexture", lamp);
+    });
+    agree(&glb, &settings(16, 16, 16), [64, 32, 256], 0.003, "normal maps and textured lamps");
+}
+
+#[test]
+fn things_that_move() {
+    let glb = room(10.0, |glb| {
+        let ball = glb.body(plastic(0.4), sphere(Vec3::new(0.0, -0.4, 0.1), 0.35, 8));
+        glb.animate(ball, "translation", "LINEAR", &[0.0, 1.0], &[-0.4, 0.0, 0.0, 0.4, 0.2, 0.0]);
+        let lamp = glb.light(json!({"type": "point", "intensity": 0.5}), json!({}));
+        glb.animate(lamp, "translation", "LINEAR", &[0.0, 1.0], &[0.7, 0.3, 0.3, 0.7, -0.5, 0.3]);
+    });
+    let mut open = settings(16, 16, 16);
+    open.shutter = Shutter { open: 0.0, close: 1.0 };
+    agree(&glb, &open, [64, 32, 128], 0.003, "moving things");
 }
 
 fn block(glb: &mut Glb) -> usize {

@@ -8,3 +8,4 @@ pub mod room;
 pub mod scenes;
 pub mod showcase;
 pub mod stage;
+pub mod textures;
