@@ -68,7 +68,7 @@ impl Lights {
         let (pdf, place) = match *self.light(light) {
             Light::Triangle { instance, triangle } => {
                 let barycentric = mesh_order(data, instance, warp::triangle(u));
-                let at = data.interaction(instance, triangle, barycentric, moment);
+                let at = data.emitter(instance, triangle, barycentric, moment);
                 (1.0 / area(data.corners(instance, triangle, moment)), Place::Surface(at))
             }
             Light::Punctual(index) => match data.punctual[index as usize].at(moment) {

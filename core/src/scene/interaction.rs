@@ -79,17 +79,34 @@ impl SceneData {
         let point = Place { mesh, triangle, weights: weights(barycentric), moment };
         match &instance.placement {
             Placement::Moving(motion) => self.interaction_of_moving(point, motion),
-            there => self.interaction_at(point, there),
+            there => self.interaction_at(point, there, Normals::Interpolated),
         }
+    }
+
+    /// The same of a point that emits and is not asked to scatter: it is shaded by its geometric normal.
+    pub fn emitter(
+        &self,
+        instance: u32,
+        triangle: u32,
+        barycentric: Vec2,
+        moment: Moment,
+    ) -> Interaction<'_> {
+        let of = &self.instances[instance as usize];
+        if let Placement::Moving(_) = of.placement {
+            return self.interaction(instance, triangle, barycentric, moment);
+        }
+        let mesh = &self.meshes[of.mesh.index()];
+        let point = Place { mesh, triangle, weights: weights(barycentric), moment };
+        self.interaction_at(point, &of.placement, Normals::Geometric)
     }
 
     #[inline(never)]
     fn interaction_of_moving(&self, point: Place<'_>, motion: &Motion) -> Interaction<'_> {
-        self.interaction_at(point, &Placement::Moved(motion.at(point.moment)))
+        self.interaction_at(point, &Placement::Moved(motion.at(point.moment)), Normals::Interpolated)
     }
 
     #[inline]
-    fn interaction_at(&self, point: Place<'_>, placement: &Placement) -> Interaction<'_> {
+    fn interaction_at(&self, point: Place<'_>, placement: &Placement, normals: Normals) -> Interaction<'_> {
         let Place { mesh, triangle, weights, moment } = point;
         let material = &self.materials[mesh.materials[triangle as usize].index()];
         let moved = match placement {
@@ -99,7 +116,12 @@ impl SceneData {
         let on = SurfacePoint::new(mesh.corners(triangle, moment), Vec2::new(weights.y, weights.z), moved);
         let (position, ng) = (on.position, on.normal);
         let at = coordinates(mesh, triangle, weights);
-        let shading = shading_frame(point, placement, ng, || material.mapped_normal(&self.textures, &at));
+        let shading = match normals {
+            Normals::Interpolated => {
+                shading_frame(point, placement, ng, || material.mapped_normal(&self.textures, &at))
+            }
+            Normals::Geometric => Frame::around(ng),
+        };
         Interaction { position, ng, shading, at, moment, material, textures: &self.textures, point: on }
     }
 }
@@ -121,6 +143,13 @@ fn coordinates(mesh: &Mesh, triangle: u32, weights: Vec3) -> SurfaceCoordinates 
     let colour =
         if mesh.colours.is_empty() { Vec4::ONE } else { mix(corners.map(|v| mesh.colours[v]), weights) };
     SurfaceCoordinates { uvs: [uv(&mesh.uvs[0]), uv(&mesh.uvs[1])], colour }
+}
+
+/// By which normals a point is shaded.
+#[derive(Clone, Copy)]
+enum Normals {
+    Interpolated,
+    Geometric,
 }
 
 /// A point of a mesh at a moment.

@@ -142,7 +142,7 @@ fn sample_triangle(
         Some(spherical) => (meet(corners, point, spherical.sample(u))?, Some(spherical.solid_angle())),
         None => (warp::triangle(u), None),
     };
-    let at = data.interaction(instance, triangle, mesh_order(data, instance, barycentric), moment);
+    let at = data.emitter(instance, triangle, mesh_order(data, instance, barycentric), moment);
     let (direction, distance) =
         (at.position - point).try_normalize().map(|d| (d, (at.position - point).length()))?;
     let cos = -at.ng.dot(direction);

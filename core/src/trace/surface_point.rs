@@ -102,10 +102,15 @@ impl Edges {
     /// nothing made of it may be NaN.
     #[inline]
     fn normal(&self, moved: Option<&Moved>) -> Vec3 {
+        let front = if moved.is_some_and(Moved::mirrors) { -1.0 } else { 1.0 };
+        let squared = self.cross.length_squared();
+        if squared.is_normal() {
+            return (self.cross * (front / squared.sqrt())).as_vec3();
+        }
+        // The square of an area so small or so large is no number to divide by.
         let scale = self.cross.abs().max_element();
         if scale > 0.0 && scale.is_finite() {
-            let front = if moved.is_some_and(Moved::mirrors) { -scale } else { scale };
-            return (self.cross / front).normalize().as_vec3();
+            return (self.cross / (front * scale)).normalize().as_vec3();
         }
         let edge = self.around.iter().find_map(|edge| edge.try_normalize());
         edge.map_or(Vec3::Z, |edge| edge.any_orthonormal_vector().as_vec3())
