@@ -301,7 +301,7 @@ fn what_cannot_be_done_is_one_clear_line() {
         "--paths LD(E",
         "--paths LS_TE",
         "--preset whitted --method light",
-        "--method radiosity",
+        "--method radiosity --paths LDE",
         "--strategies 1,2",
         "--weights power",
         "--shutter 1,0",

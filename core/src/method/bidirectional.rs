@@ -1,6 +1,6 @@
 //! Paths from both ends, joined everywhere (Veach and Guibas 1995; Lafortune and Willems 1993).
 
-use crate::path::eye::{Joined, from_eye};
+use crate::path::eye::{FromEye, from_eye};
 use crate::path::light::{Keeps, from_light};
 use crate::path::rules::Rules;
 use crate::path::tally::Tally;
@@ -18,5 +18,5 @@ pub fn sample<C: Carriage>(
     tally: &mut Tally,
 ) {
     let vertices = from_light::<C>(scene, rules, (light, ray.moment), Keeps::Vertices, tally);
-    from_eye::<C>(scene, rules, eye, ray).run(&mut Joined::<C> { light: &vertices }, tally);
+    from_eye::<C>(scene, rules, eye, ray).run(&mut FromEye::<C, true> { light: &vertices }, tally);
 }

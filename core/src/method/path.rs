@@ -7,9 +7,8 @@ use crate::path::throughput::Carriage;
 use crate::sampler::Sampler;
 use crate::scene::Scene;
 use crate::trace::ray::Ray;
-use core::marker::PhantomData;
 
 /// One sample of a pixel.
 pub fn sample<C: Carriage>(scene: &Scene, rules: &Rules, ray: Ray, sampler: &Sampler, tally: &mut Tally) {
-    from_eye::<C>(scene, rules, sampler, ray).run(&mut FromEye::<C>(PhantomData), tally);
+    from_eye::<C>(scene, rules, sampler, ray).run(&mut FromEye::<C, false> { light: &[] }, tally);
 }

@@ -18,46 +18,18 @@ use crate::scene::Scene;
 use crate::scene::importance::Importance;
 use crate::scene::interaction::Interaction;
 use crate::trace::ray::Ray;
-use core::marker::PhantomData;
 use glam::Vec3;
 
-/// A walk from the eye that hits lights and makes next events.
+/// A walk from the eye that hits lights, makes next events, and is joined to all vertices of a light subpath.
+/// `TWO_WAY` where weights ask for the techniques of that subpath; without it, `light` is empty.
 #[derive(Debug)]
-pub struct FromEye<C>(pub PhantomData<C>);
-
-/// A walk from the eye that is also joined to all vertices of a light subpath.
-#[derive(Debug)]
-pub struct Joined<'v, 'a, C: Carriage> {
+pub struct FromEye<'v, 'a, C: Carriage, const TWO_WAY: bool> {
     /// Vertices of the light subpath.
     pub light: &'v [LightVertex<'a, C::Light>],
 }
 
-impl<'a, C: Carriage> Visitor<'a, EyeState, C::Eye> for FromEye<C> {
-    const TWO_WAY: bool = false;
-
-    fn escapes(&mut self, walk: &Walk<'a, EyeState, C::Eye>, tally: &mut Tally) {
-        hit_environment::<C::Eye, C::Light>(walk, tally);
-    }
-
-    fn arrives(
-        &mut self,
-        walk: &mut Walk<'a, EyeState, C::Eye>,
-        at: &Interaction<'a>,
-        triangle: (u32, u32),
-        tally: &mut Tally,
-    ) {
-        hit_surface::<C::Eye, C::Light>(walk, at, triangle, tally);
-    }
-
-    fn scatters(&mut self, walk: &Walk<'a, EyeState, C::Eye>, vertex: &Vertex<'a>, tally: &mut Tally) {
-        if vertex.is_smooth() {
-            next_event::<C::Eye, C::Light>(walk, vertex, tally);
-        }
-    }
-}
-
-impl<'a, C: Carriage> Visitor<'a, EyeState, C::Eye> for Joined<'_, 'a, C> {
-    const TWO_WAY: bool = true;
+impl<'a, C: Carriage, const TWO_WAY: bool> Visitor<'a, EyeState, C::Eye> for FromEye<'_, 'a, C, TWO_WAY> {
+    const TWO_WAY: bool = TWO_WAY;
 
     fn escapes(&mut self, walk: &Walk<'a, EyeState, C::Eye>, tally: &mut Tally) {
         hit_environment::<C::Eye, C::Light>(walk, tally);
