@@ -108,8 +108,9 @@ mod tests {
     };
 
     fn status(state: &str) -> String {
-        let settings = r#"{"size":{"width":1,"height":1},"camera":"framed","method":"path","bounces":null,
-            "lens":null,"environment":null,"shadows":"on","seed":0,"replicates":4}"#;
+        let settings = r#"{"size":{"width":1,"height":1},"camera":"framed","method":"path","paths":"L(D|S)*E",
+            "layers":[],"gloss":"as_it_is","strategies":[],"weights":"balance","bounces":null,"lens":null,
+            "shutter":{"open":0,"close":0},"environment":null,"shadows":"on","seed":0,"replicates":4}"#;
         let text = format!(
             r#"{{"id":"j","name":"n","scene":"{}","state":"{state}","version":1,"priority":0,
             "created_at":"2026-01-01T00:00:00Z","samples_done":0,"samples_asked":1,"batches_done":0,
