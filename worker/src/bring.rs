@@ -5,9 +5,9 @@ use bytes::Bytes;
 use ovtigre_proto::{
     client::farm::Client,
     id::LeaseId,
-    lease::{FailureKind, LeaseFailure},
+    lease::{Committed, FailureKind, LeaseFailure},
 };
-use std::sync::Arc;
+use std::{sync::Arc, time::Duration};
 
 /// A rendered batch.
 #[derive(Clone, Debug)]
@@ -18,11 +18,32 @@ pub struct Rendered {
     pub sum: Bytes,
     /// Time spent on it in seconds.
     pub seconds: f64,
+    /// Where it may be put directly.
+    pub upload: Option<String>,
+}
+
+/// Slowest line that is waited for, in bytes a second.
+const SLOWEST: f64 = 50_000.0;
+
+/// Puts a sum where its lease said, and tells the farm; `None` where that does not work.
+async fn hand(client: &Client, rendered: &Rendered) -> Option<Committed> {
+    let Rendered { lease, sum, seconds, upload } = rendered;
+    let patience = Duration::from_secs_f64(10.0 + sum.len() as f64 / SLOWEST);
+    if let Err(error) = client.put_elsewhere(upload.as_deref()?, sum.clone(), patience).await {
+        tracing::debug!(%lease, %error, "a sum could not be put directly");
+        return None;
+    }
+    client.handed(lease, *seconds).await.ok()
 }
 
 /// Brings a sum until the farm has taken or refused it; takes its lease off the desk.
 pub async fn bring(client: Client, desk: Arc<Desk>, rendered: Rendered) {
-    let Rendered { lease, sum, seconds } = rendered;
+    if let Some(committed) = hand(&client, &rendered).await {
+        tracing::debug!(lease = %rendered.lease, commit = ?committed.commit, "put directly");
+        desk.remove(&rendered.lease);
+        return;
+    }
+    let Rendered { lease, sum, seconds, .. } = rendered;
     let mut backoff = client.backoff();
     loop {
         match client.bring(&lease, sum.clone(), seconds).await {

@@ -152,7 +152,8 @@ impl<R: Renderer> Labour<R> {
             method: settings.method.name().to_owned(),
         };
         let sum = write_partial(&sum, settings.size, &attributes).into();
-        Ok(Some(Rendered { lease: id.clone(), sum, seconds: start.elapsed().as_secs_f64() }))
+        let seconds = start.elapsed().as_secs_f64();
+        Ok(Some(Rendered { lease: id.clone(), sum, seconds, upload: work.lease.upload.clone() }))
     }
 
     fn scene(&self, lease: &Lease, files: Option<Files>) -> Result<Arc<R::Scene>, Failed> {
