@@ -97,7 +97,7 @@ pub(super) async fn unsettled(db: &mut Db) -> Result<Vec<JobRow>> {
 pub(super) async fn heads(db: &mut Db) -> Result<Vec<JobHead>> {
     let rows = query(
         "SELECT id, version, state, brought, looks, progress,
-                CASE WHEN ends_ms > $1 THEN 0 ELSE 1 END AS free
+                CAST(CASE WHEN ends_ms > $1 THEN 0 ELSE 1 END AS BIGINT) AS free
          FROM job LEFT JOIN merger ON merger.job = job.id WHERE settled = 0 ORDER BY sequence",
     );
     let now = db.now().await?;
