@@ -2,6 +2,11 @@
 
 use crate::desk::Desk;
 use bytes::Bytes;
+use ovtigre_core::film::{
+    exr::{PartialAttributes, write_partial},
+    size::Size,
+    sum::Sum,
+};
 use ovtigre_proto::{
     client::farm::Client,
     id::LeaseId,
@@ -14,8 +19,12 @@ use std::{sync::Arc, time::Duration};
 pub struct Rendered {
     /// Whose.
     pub lease: LeaseId,
-    /// Its partial EXR.
-    pub sum: Bytes,
+    /// Its sum.
+    pub sum: Sum,
+    /// The frame's size.
+    pub size: Size,
+    /// What its partial EXR says of it.
+    pub attributes: PartialAttributes,
     /// Time spent on it in seconds.
     pub seconds: f64,
     /// Where it may be put directly.
@@ -26,24 +35,35 @@ pub struct Rendered {
 const SLOWEST: f64 = 50_000.0;
 
 /// Puts a sum where its lease said, and tells the farm; `None` where that does not work.
-async fn hand(client: &Client, rendered: &Rendered) -> Option<Committed> {
-    let Rendered { lease, sum, seconds, upload } = rendered;
+async fn hand(client: &Client, lease: &LeaseId, url: &str, sum: &Bytes, seconds: f64) -> Option<Committed> {
     let patience = Duration::from_secs_f64(10.0 + sum.len() as f64 / SLOWEST);
-    if let Err(error) = client.put_elsewhere(upload.as_deref()?, sum.clone(), patience).await {
+    if let Err(error) = client.put_elsewhere(url, sum.clone(), patience).await {
         tracing::debug!(%lease, %error, "a sum could not be put directly");
         return None;
     }
-    client.handed(lease, *seconds).await.ok()
+    client.handed(lease, seconds).await.ok()
 }
 
-/// Brings a sum until the farm has taken or refused it; takes its lease off the desk.
+/// Brings a sum until the farm has taken or refused it; takes its lease off the desk. Its file is written here,
+/// while the pool renders the next batch.
 pub async fn bring(client: Client, desk: Arc<Desk>, rendered: Rendered) {
-    if let Some(committed) = hand(&client, &rendered).await {
-        tracing::debug!(lease = %rendered.lease, commit = ?committed.commit, "put directly");
-        desk.remove(&rendered.lease);
+    let Rendered { lease, sum, size, attributes, seconds, upload } = rendered;
+    let partial = tokio::task::spawn_blocking(move || Bytes::from(write_partial(&sum, size, &attributes)));
+    let sum = match partial.await {
+        Ok(sum) => sum,
+        Err(error) => {
+            desk.remove(&lease);
+            return give_back(&client, &lease, FailureKind::Worker, format!("writing a sum failed: {error}"))
+                .await;
+        }
+    };
+    if let Some(url) = upload
+        && let Some(committed) = hand(&client, &lease, &url, &sum, seconds).await
+    {
+        tracing::debug!(%lease, commit = ?committed.commit, "put directly");
+        desk.remove(&lease);
         return;
     }
-    let Rendered { lease, sum, seconds, .. } = rendered;
     let mut backoff = client.backoff();
     loop {
         match client.bring(&lease, sum.clone(), seconds).await {

@@ -9,7 +9,7 @@ use crate::{
     scenes::{SceneError, SceneFolder},
 };
 use ovtigre_core::{
-    film::exr::{PartialAttributes, write_partial},
+    film::exr::PartialAttributes,
     settings::{EnvironmentSource, Settings},
 };
 use ovtigre_proto::{
@@ -151,9 +151,9 @@ impl<R: Renderer> Labour<R> {
             scene: scene_id.to_string(),
             method: settings.method.name().to_owned(),
         };
-        let sum = write_partial(&sum, settings.size, &attributes).into();
         let seconds = start.elapsed().as_secs_f64();
-        Ok(Some(Rendered { lease: id.clone(), sum, seconds, upload: work.lease.upload.clone() }))
+        let (lease, size, upload) = (id.clone(), settings.size, work.lease.upload.clone());
+        Ok(Some(Rendered { lease, sum, size, attributes, seconds, upload }))
     }
 
     fn scene(&self, lease: &Lease, files: Option<Files>) -> Result<Arc<R::Scene>, Failed> {

@@ -80,7 +80,6 @@ impl Farm {
             self.book().remove(&live.id);
             live.end(Ending { state: head.state, reason: None, certified: false, waits: Waits::Not });
         }
-        self.book().reach(&live.id, head.looks);
         if live.mandate().is_some() {
             return self.follow_commits(live, head.brought).await;
         }
@@ -90,6 +89,7 @@ impl Farm {
         }
         let view = live.view();
         if view.curve.len() < head.looks as usize || view.progress != head.progress {
+            self.book().reach(&live.id, head.looks);
             let curve = self.store.curve(&live.id).await?;
             let layers = self.store.layers(&live.id).await?;
             live.set_view(|view| {
