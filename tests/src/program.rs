@@ -1,5 +1,6 @@
 //! The program `ovtigre` as processes: a farm, workers, commands.
 
+use ovtigre_proto::client::farm::Client;
 use std::{
     ffi::OsStr,
     io::{BufRead as _, BufReader},
@@ -105,7 +106,10 @@ impl Farm {
 
     /// The job as JSON.
     pub fn job(&self, id: &str) -> serde_json::Value {
-        serde_json::from_str(&self.client(&["status", id, "--json"])).expect("JSON")
+        let id = id.parse().expect("a job's name");
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a thread");
+        let job = runtime.block_on(async { Client::new(&self.url, 0)?.job(&id).await });
+        serde_json::to_value(job.expect("the farm answers")).expect("plain data")
     }
 
     /// Waits until `reached` says so of the job, at most two minutes.

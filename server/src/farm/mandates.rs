@@ -40,6 +40,9 @@ impl Farm {
 
     /// Lengthens this server's mandates; those that it lost end.
     pub(super) async fn keep_mandates(&self) -> Result<()> {
+        if !self.is_shared() {
+            return Ok(());
+        }
         let mine: Vec<Arc<Live>> = self.lives().into_iter().filter(|live| live.mandate().is_some()).collect();
         if mine.is_empty() {
             return Ok(());

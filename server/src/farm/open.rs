@@ -27,7 +27,7 @@ use tokio::sync::Semaphore;
 /// Scenes looked into at a time: each is in memory whole.
 const INSPECTORS: usize = 2;
 /// Uploads that were begun so long ago were cut off.
-const UPLOAD_MAX: Duration = Duration::from_hours(24);
+pub(super) const UPLOAD_MAX: Duration = Duration::from_hours(24);
 
 impl Farm {
     /// A farm that goes on where the last one over the same store and blobs ended, however it ended.

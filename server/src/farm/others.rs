@@ -88,7 +88,7 @@ impl Farm {
             live.kick.notify_one();
         }
         let view = live.view();
-        if view.curve.len() < head.looks as usize || view.progress != head.progress {
+        if view.curve.len() < head.looks as usize || view.progress.batches < head.progress.batches {
             self.book().reach(&live.id, head.looks);
             let curve = self.store.curve(&live.id).await?;
             let layers = self.store.layers(&live.id).await?;

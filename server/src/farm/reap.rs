@@ -5,8 +5,9 @@ use super::{
     counters::Fate,
     error::{FarmError, Result},
     live::{Ending, Live, Waits},
+    open::UPLOAD_MAX,
 };
-use crate::store::error::StoreError;
+use crate::{blobs::BlobFolder, store::error::StoreError};
 use ovtigre_proto::status::JobState;
 use std::{sync::Arc, time::Duration};
 
@@ -55,12 +56,18 @@ impl Farm {
                 () = self.stopping.cancelled() => return,
                 _ = keep.tick() => self.keep_and_tell().await,
                 _ = beat.tick() => self.reap_and_follow().await,
-                _ = hour.tick() => self.store.forget_keys(self.rules.keys).await.map_err(FarmError::from),
+                _ = hour.tick() => self.forget_old().await,
             };
             if let Err(error) = done {
                 tracing::error!(%error, "looking after leases and deadlines failed");
             }
         }
+    }
+
+    /// Forgets idempotency keys, and uploads that were cut off.
+    async fn forget_old(&self) -> Result<()> {
+        self.store.forget_keys(self.rules.keys).await?;
+        Ok(self.blobs.delete_older(&BlobFolder::Incoming, UPLOAD_MAX).await?)
     }
 
     async fn reap_and_follow(self: &Arc<Self>) -> Result<()> {
