@@ -132,7 +132,10 @@ mod tests {
         for row in (0..ROWS).step_by(9) {
             for column in (0..COLUMNS).step_by(5) {
                 let (got, expected) = (f64::from(NODES[row * COLUMNS + column]), node(row, column, 200));
-                assert!((got - expected).abs() < 1e-4 * expected.max(1.0), "{row} {column}: {got} {expected}");
+                assert!(
+                    (got - expected).abs() < 1e-4 * expected.max(1.0),
+                    "{row} {column}: {got} {expected}"
+                );
             }
         }
     }

@@ -11,6 +11,8 @@ pub(crate) struct Source<'a> {
     pub(crate) document: &'a Document,
     pub(crate) buffers: &'a Buffers<'a>,
     pub(crate) limits: &'a Limits,
+    /// Number of the variant of materials that is shown.
+    pub(crate) variant: Option<usize>,
 }
 
 /// Typed elements, checked to lie within their buffers.
@@ -267,12 +269,7 @@ impl<'a> Source<'a> {
         Ok(Strided { bytes: &view_bytes.bytes[offset as usize..end as usize], stride })
     }
 
-    fn sparse(
-        &self,
-        item: &At<'_>,
-        size: usize,
-        count: u64,
-    ) -> Result<Option<Sparse<'a>>, LoadError> {
+    fn sparse(&self, item: &At<'_>, size: usize, count: u64) -> Result<Option<Sparse<'a>>, LoadError> {
         let Some(sparse) = item.object("sparse")? else {
             return Ok(None);
         };

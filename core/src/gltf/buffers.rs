@@ -60,12 +60,8 @@ impl<'a> Buffers<'a> {
         mut binary: Option<Cow<'a, [u8]>>,
         limits: &Limits,
     ) -> Result<Self, LoadError> {
-        let mut buffers = Self {
-            bytes: Vec::new(),
-            same: Vec::new(),
-            decoded: BTreeMap::new(),
-            filled: BTreeMap::new(),
-        };
+        let mut buffers =
+            Self { bytes: Vec::new(), same: Vec::new(), decoded: BTreeMap::new(), filled: BTreeMap::new() };
         let items = document.list("buffers")?;
         let mut known: BTreeMap<&str, usize> = BTreeMap::new();
         let mut total = 0_u64;

@@ -81,12 +81,7 @@ fn coverage(item: &At<'_>, material: &mut Material) -> Result<(), LoadError> {
 }
 
 impl Reader<'_> {
-    fn slot(
-        &mut self,
-        at: &At<'_>,
-        key: &str,
-        encoding: Encoding,
-    ) -> Result<Option<TextureSlot>, LoadError> {
+    fn slot(&mut self, at: &At<'_>, key: &str, encoding: Encoding) -> Result<Option<TextureSlot>, LoadError> {
         self.table.slot(self.document, at, key, encoding, &mut self.sets, self.problems)
     }
 
@@ -204,6 +199,22 @@ impl Reader<'_> {
                 layers.sheen_roughness.factor = sheen.share("sheenRoughnessFactor")?.unwrap_or(0.0);
                 let slot = self.slot(&sheen, "sheenRoughnessTexture", Encoding::Linear)?;
                 layers.sheen_roughness.texture = slot;
+            }
+        }
+        if let Some(through) = item.extension("KHR_materials_diffuse_transmission")? {
+            layers.through.factor = through.share("diffuseTransmissionFactor")?.unwrap_or(0.0);
+            if layers.through.factor > 0.0 {
+                let color = colour(&through, "diffuseTransmissionColorFactor")?;
+                layers.through_color.factor = color.unwrap_or(Vec3::ONE).min(Vec3::ONE);
+                layers.through.texture =
+                    self.slot(&through, "diffuseTransmissionTexture", Encoding::Linear)?;
+                layers.through_color.texture =
+                    self.slot(&through, "diffuseTransmissionColorTexture", Encoding::Srgb)?;
+                if item.extension("KHR_materials_volume")?.is_some() {
+                    let detail = "diffuse transmission into a volume is that through a thin wall: what it encloses \
+                                  does not scatter";
+                    self.problems.add(&through.pointer, detail);
+                }
             }
         }
         if layers != LayerMaterial::NONE {

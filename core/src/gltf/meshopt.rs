@@ -80,8 +80,12 @@ impl Compressed<'_> {
 
     fn codec(&self, mode: &str, filter: &str) -> Result<Codec, LoadError> {
         Ok(match (mode, filter) {
-            ("TRIANGLES", "NONE") => |c, source| decode_index_buffer(c.count, c.stride, source, &mut c.room()),
-            ("INDICES", "NONE") => |c, source| decode_index_sequence(c.count, c.stride, source, &mut c.room()),
+            ("TRIANGLES", "NONE") => {
+                |c, source| decode_index_buffer(c.count, c.stride, source, &mut c.room())
+            }
+            ("INDICES", "NONE") => {
+                |c, source| decode_index_sequence(c.count, c.stride, source, &mut c.room())
+            }
             ("ATTRIBUTES", "NONE") => |c, source| c.vertices(source),
             ("ATTRIBUTES", "OCTAHEDRAL") => |c, source| {
                 let mut bytes = c.vertices(source)?;

@@ -7,9 +7,7 @@ use crate::gltf::load::load;
 use crate::scene::mesh::Mesh;
 use glam::{Vec2, Vec3, Vec4};
 use meshoptimizer_rs::Workspace;
-use meshoptimizer_rs::codec::{
-    IndexEncoding, VertexEncoding, encode_index_buffer, encode_vertex_buffer,
-};
+use meshoptimizer_rs::codec::{IndexEncoding, VertexEncoding, encode_index_buffer, encode_vertex_buffer};
 use serde_json::json;
 
 /// A unit square of two triangles with coordinates like its positions and red, green, blue and half transparent white
@@ -86,7 +84,8 @@ fn accessors_take_what_draco_holds_in_their_own_types_and_counts() {
     builder.json["accessors"][3]["componentType"] = json!(U32);
     let loaded = builder.load();
     assert_eq!(loaded.scene.meshes[0].triangles.len(), 2);
-    let says = |pointer: &str| loaded.warnings.iter().any(|w| w.pointer == pointer && w.detail.contains("says 9"));
+    let says =
+        |pointer: &str| loaded.warnings.iter().any(|w| w.pointer == pointer && w.detail.contains("says 9"));
     assert!(says("/accessors/2/count"), "{:?}", loaded.warnings);
 }
 
@@ -130,11 +129,12 @@ fn compress(builder: &mut Builder, view: usize, encoded: &[u8], (count, stride):
 
 fn meshopt() -> Builder {
     let mut builder = Builder::new();
-    let (position, corners) = (builder.floats("VEC3", &TRIANGLE), [0_u32, 1, 2].map(u32::to_le_bytes).concat());
+    let (position, corners) =
+        (builder.floats("VEC3", &TRIANGLE), [0_u32, 1, 2].map(u32::to_le_bytes).concat());
     let indices = builder.accessor(&corners, U32, "SCALAR", 3);
     builder.primitive(&json!({"attributes": {"POSITION": position}, "indices": indices}));
     let mut room = Workspace::default();
-    let oldest = VertexEncoding { version: 0, ..VertexEncoding::DEFAULT };
+    let oldest = VertexEncoding::new(0, 2).unwrap();
     let vertices = encode_vertex_buffer(&bytes(&TRIANGLE), 3, 12, oldest, &mut room).unwrap();
     compress(&mut builder, 0, &vertices, (3, 12), "ATTRIBUTES");
     let triangles = encode_index_buffer(&[0, 1, 2], IndexEncoding::DEFAULT, &mut room).unwrap();
@@ -159,7 +159,7 @@ fn broken_meshopt_is_refused_by_name() {
     let pointer = "/bufferViews/0/extensions/EXT_meshopt_compression";
     for (member, value) in [
         ("buffer", json!(7)),
-        ("byteLength", json!(1 << 40)),
+        ("byteLength", json!(1_u64 << 40)),
         ("byteLength", json!(3)),
         ("byteStride", json!(13)),
         ("count", json!(0)),
