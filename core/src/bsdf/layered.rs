@@ -77,7 +77,7 @@ impl Layered {
     pub(super) fn new(
         layers: &Layers,
         through: Option<(f32, Plastic)>,
-        below: Kept,
+        below: &Kept,
         letters: Letters,
         walls: Walls,
     ) -> Self {
@@ -87,7 +87,7 @@ impl Layered {
             frame: Frame::around(layers.coat_normal),
         });
         let sheen = Sheen::new(layers.sheen, layers.sheen_roughness);
-        Self { coat, sheen, through, below, letters, walls }
+        Self { coat, sheen, through, below: *below, letters, walls }
     }
 
     pub(super) fn letters(&self) -> Letters {
@@ -141,8 +141,7 @@ impl Layered {
                 let albedo = |(weight, part): &(f32, Plastic)| weight * luminance(part.base_albedo(wo));
                 o.coat * o.sheen * self.through.as_ref().map_or(0.0, albedo)
             }
-            Lobe::Coat if o.on_coat.z <= 0.0 => 0.0,
-            Lobe::CoatTwin if o.on_coat.z <= 0.0 => 0.0,
+            Lobe::Coat | Lobe::CoatTwin if o.on_coat.z <= 0.0 => 0.0,
             Lobe::Coat => 1.0 - o.coat,
             Lobe::CoatTwin => {
                 self.coat.as_ref().map_or(0.0, |coat| coat.share * coat.interface.mirror(o.on_coat).x)

@@ -44,8 +44,9 @@ use glam::{Vec2, Vec3};
 /// A direction with a smaller |cos θ| lies in the surface: products of two still are normal numbers.
 const HORIZON: f32 = 1e-18;
 
-/// What a surface does to light at one point. Built at every hit: no heap, and only the variant's own part is written.
-#[derive(Clone, Copy, Debug)]
+/// What a surface does to light at one point. Built at every hit: no heap but for layers, which would make all others twice
+/// as large, and only the variant's own part is written.
+#[derive(Clone, Debug)]
 pub enum Bsdf {
     /// Ideally diffuse.
     Lambert(Lambert),
@@ -60,7 +61,7 @@ pub enum Bsdf {
     /// Some lobes of any of them.
     Kept(Kept),
     /// Any of them under a coat or cloth.
-    Layered(Layered),
+    Layered(Box<Layered>),
 }
 
 impl Bsdf {
@@ -105,7 +106,7 @@ impl Bsdf {
             through = Some((*weight, of(layers.through_color * layers.through)));
         }
         let below = Kept::new(&below, letters);
-        Self::Layered(Layered::new(layers, through, below, letters, s.walls))
+        Self::Layered(Box::new(Layered::new(layers, through, &below, letters, s.walls)))
     }
 
     fn whole(s: &SurfaceParameters) -> Self {

@@ -117,8 +117,8 @@ impl Component {
     /// Whether an unsigned integer of this type reaches `index`.
     pub(crate) fn holds_index(self, index: u32) -> bool {
         match self {
-            Self::U8 => index <= u32::from(u8::MAX),
-            Self::U16 => index <= u32::from(u16::MAX),
+            Self::U8 => u8::try_from(index).is_ok(),
+            Self::U16 => u16::try_from(index).is_ok(),
             Self::U32 => true,
             Self::I8 | Self::I16 | Self::F32 => false,
         }

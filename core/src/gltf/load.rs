@@ -99,7 +99,7 @@ pub fn load_as(bundle: &Bundle, limits: &Limits, choice: &Choice<'_>) -> Result<
         volume.absorption = (volume.absorption.as_dvec3() * metres).as_vec3();
     }
     let variants = variants::names(&document)?;
-    let report = Report { animated, variants, ..Report::of(&scene, meshes, instances, dropped) };
+    let report = Report { variants, animated, ..Report::of(&scene, meshes, instances, dropped) };
     point_out_what_is_missing(&scene, &report, &mut problems);
     Ok(Loaded { scene, warnings: problems.finish(), report })
 }
