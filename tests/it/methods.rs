@@ -1,10 +1,11 @@
 //! All methods agree.
 
 use glam::Vec3;
+use ovtigre_core::film::size::Size;
 use ovtigre_core::settings::{Layer, Lens, Method, Settings, Shows, Shutter};
 use ovtigre_tests::{
     glb::Glb,
-    picture::{in_environment, rendered, settings},
+    picture::{Parts, in_environment, rendered, settings},
     scenes::{cuboid, glass, lambert, quad, sphere},
     stage::{metal, plastic, room, room_in_parallel, smooth_sphere},
     textures::{UVS, png},
@@ -15,14 +16,62 @@ fn by(method: Method, settings: &Settings) -> Settings {
     Settings { method, ..settings.clone() }
 }
 
-/// Asserts that light from the eye, from the light and from both is the same.
-fn agree(glb: &[u8], settings: &Settings, samples: [u32; 3], power: f64, what: &str) {
-    let path = rendered(glb, &by(Method::Path, settings), samples[0]);
-    let both = rendered(glb, &by(Method::Bidirectional, settings), samples[1]);
-    path.assert_same(&both, power, &format!("{what}: path and bidirectional"));
-    if samples[2] > 0 {
-        let light = rendered(glb, &by(Method::Light, settings), samples[2]);
-        path.assert_same(&light, power, &format!("{what}: path and light"));
+/// Samples a pixel and replicate by each method; 0 where it is not asked.
+#[derive(Clone, Copy)]
+struct Samples {
+    path: u32,
+    both: u32,
+    light: u32,
+    /// Passes.
+    photon: u32,
+}
+
+/// What photons show at radius zero, extrapolated from four radii: of a picture of `side` pixels a side, of half as many
+/// (twice the radius), and each with half the area of gathering. What edges and corners take away is in proportion to the
+/// radius and its square, what flat surfaces smear to its square: both are taken out, replicate by replicate, so that the
+/// spread of what remains is the error of the result.
+fn photons(glb: &[u8], settings: &Settings, side: u32, passes: u32, what: &str) -> Parts {
+    let mut settings = by(Method::Photon, settings);
+    settings.layers.push(Layer { name: "narrow".to_owned(), shows: Shows::Narrow });
+    let [fine, coarse] = [side, side / 2].map(|side| {
+        settings.size = Size { width: side, height: side };
+        let picture = rendered(glb, &settings, passes);
+        assert_eq!(picture.invalid(), 0, "{what}: samples were dropped");
+        eprintln!("   {side}: {:?} {:?}", picture.mean_of(0), picture.mean_of(1));
+        // What is in proportion to the radius is not in this.
+        let linear = |[wide, narrow]: [f64; 2]| wide + (narrow - wide) / (1.0 - 0.5_f64.sqrt());
+        Parts::combined([&picture.parts(0), &picture.parts(1)], linear)
+    });
+    Parts::combined([&fine, &coarse], |[fine, coarse]| fine + (fine - coarse) / 3.0)
+}
+
+/// Asserts that light from the eye, from the light, from both and by photons is the same, in all of the picture and in its
+/// blocks of 16×16 pixels.
+fn agree(glb: &[u8], settings: &Settings, samples: Samples, power: f64, what: &str) {
+    let t = std::time::Instant::now();
+    let path = rendered(glb, &by(Method::Path, settings), samples.path);
+    eprintln!("{what}: path {:?} {:?}", path.mean(), t.elapsed());
+    for (method, samples) in [(Method::Bidirectional, samples.both), (Method::Light, samples.light)] {
+        if samples > 0 && std::env::var("SIDE").is_err() {
+            let t = std::time::Instant::now();
+            let other = rendered(glb, &by(method, settings), samples);
+            eprintln!("{what}: {method:?} {:?} {:?}", other.mean(), t.elapsed());
+            path.assert_same(&other, power, &format!("{what}: path and {method:?}"));
+        }
+    }
+    if std::env::var("SIDE").is_ok() {
+        let side: u32 = std::env::var("SIDE").unwrap().parse().unwrap();
+        let passes: u32 = std::env::var("PASSES").unwrap().parse().unwrap();
+        let cpu = || std::fs::read_to_string("/proc/self/stat").unwrap().split(' ').nth(13).unwrap().parse::<u64>().unwrap();
+        let t = cpu();
+        let photons = photons(glb, settings, side, passes, what);
+        eprintln!("{what}: photon {:?} cpu {}", photons.whole(), cpu() - t);
+        path.parts(0).assert_same(&photons, power, &format!("{what}: path and photons"));
+    } else if samples.photon > 0 {
+        let t = std::time::Instant::now();
+        let photons = photons(glb, settings, 256, samples.photon, what);
+        eprintln!("{what}: photon {:?} {:?}", photons.whole(), t.elapsed());
+        path.parts(0).assert_same(&photons, power, &format!("{what}: path and photons"));
     }
 }
 
@@ -31,7 +80,7 @@ fn a_diffuse_room() {
     let glb = room(10.0, |glb| {
         glb.body(lambert(0.8, 0.0), cuboid(Vec3::new(-0.5, -1.0, -0.5), Vec3::new(0.2, 0.1, 0.2)))
     });
-    agree(&glb, &settings(16, 16, 16), [32, 8, 16], 0.003, "diffuse");
+    agree(&glb, &settings(64, 64, 16), Samples { path: 2, both: 1, light: 1, photon: 1 }, 0.003, "diffuse");
 }
 
 #[test]
@@ -41,7 +90,13 @@ fn smooth_normals_gloss_and_metal() {
         smooth_sphere(glb, metal(0.4), Vec3::new(0.5, -0.4, 0.2), 0.4);
         smooth_sphere(glb, lambert(0.8, 0.0), Vec3::new(0.1, 0.4, -0.3), 0.3);
     });
-    agree(&glb, &settings(16, 16, 16), [32, 32, 128], 0.003, "smooth normals");
+    agree(
+        &glb,
+        &settings(64, 64, 16),
+        Samples { path: 2, both: 2, light: 8, photon: 1 },
+        0.003,
+        "smooth normals",
+    );
 }
 
 #[test]
@@ -52,9 +107,21 @@ fn rough_and_smooth_glass() {
         material
     };
     let glb = room(10.0, |glb| smooth_sphere(glb, rough(0.5), Vec3::new(0.0, -0.3, 0.0), 0.6));
-    agree(&glb, &settings(16, 16, 16), [128, 32, 256], 0.003, "rough glass");
+    agree(
+        &glb,
+        &settings(64, 64, 16),
+        Samples { path: 8, both: 2, light: 16, photon: 1 },
+        0.003,
+        "rough glass",
+    );
     let glb = room(10.0, |glb| smooth_sphere(glb, rough(0.0), Vec3::new(0.0, -0.3, 0.0), 0.6));
-    agree(&glb, &settings(16, 16, 16), [256, 64, 0], 0.003, "smooth glass");
+    agree(
+        &glb,
+        &settings(64, 64, 16),
+        Samples { path: 16, both: 4, light: 0, photon: 1 },
+        0.003,
+        "smooth glass",
+    );
 }
 
 #[test]
@@ -66,7 +133,7 @@ fn coated_plastic_and_mixtures() {
         mixed["extensions"] = json!({"KHR_materials_transmission": {"transmissionFactor": 0.5}});
         glb.body(mixed, cuboid(Vec3::new(0.2, -1.0, -0.3), Vec3::new(0.7, 0.0, 0.4)));
     });
-    agree(&glb, &settings(16, 16, 16), [32, 16, 0], 0.003, "coated");
+    agree(&glb, &settings(64, 64, 16), Samples { path: 2, both: 1, light: 0, photon: 1 }, 0.003, "coated");
 }
 
 #[test]
@@ -74,20 +141,20 @@ fn lights_of_every_kind() {
     let half = std::f64::consts::FRAC_1_SQRT_2;
     let down = json!({"translation": [0.2, 0.8, 0.1], "rotation": [-half, 0.0, 0.0, half]});
     let point = room(0.0, |glb| glb.light(json!({"type": "point", "intensity": 2.0}), down.clone()));
-    agree(&point, &settings(16, 16, 16), [32, 16, 32], 0.003, "point");
+    agree(&point, &settings(64, 64, 16), Samples { path: 2, both: 1, light: 2, photon: 1 }, 0.003, "point");
     let spot =
         json!({"type": "spot", "intensity": 4.0, "spot": {"innerConeAngle": 0.3, "outerConeAngle": 0.8}});
     let spot = room(0.0, |glb| glb.light(spot, down.clone()));
-    agree(&spot, &settings(16, 16, 16), [16, 16, 64], 0.003, "spot");
+    agree(&spot, &settings(64, 64, 16), Samples { path: 1, both: 1, light: 4, photon: 1 }, 0.003, "spot");
     let along = json!({"rotation": [-0.3, 0.2, 0.0, 0.93]});
     let sun = room(0.0, |glb| glb.light(json!({"type": "directional", "intensity": 3.0}), along));
-    agree(&sun, &settings(16, 16, 16), [16, 16, 64], 0.003, "sun");
-    let sky = in_environment(settings(16, 16, 16), 1.0);
-    agree(&room(0.0, |_| ()), &sky, [32, 64, 512], 0.003, "sky");
+    agree(&sun, &settings(64, 64, 16), Samples { path: 1, both: 1, light: 4, photon: 1 }, 0.003, "sun");
+    let sky = in_environment(settings(64, 64, 16), 1.0);
+    agree(&room(0.0, |_| ()), &sky, Samples { path: 2, both: 4, light: 32, photon: 1 }, 0.003, "sky");
     let both = room(4.0, |glb| {
         glb.light(json!({"type": "point", "intensity": 1.0}), json!({"translation": [-0.5, 0.0, 0.2]}))
     });
-    agree(&both, &sky, [32, 32, 128], 0.003, "sky, lamp and point");
+    agree(&both, &sky, Samples { path: 2, both: 2, light: 8, photon: 1 }, 0.003, "sky, lamp and point");
 }
 
 /// A quad whose material has a texture of 4×4 texels in the given place.
@@ -111,7 +178,13 @@ fn normal_maps_and_textured_lamps() {
         let lamp = [at(0.6, -0.6, -0.9), at(0.95, -0.6, -0.6), at(0.95, 0.4, -0.6), at(0.6, 0.4, -0.9)];
         textured(glb, lambert(0.2, 6.0), &glow, "emissiveTexture", lamp);
     });
-    agree(&glb, &settings(16, 16, 16), [64, 32, 256], 0.003, "normal maps and textured lamps");
+    agree(
+        &glb,
+        &settings(64, 64, 16),
+        Samples { path: 4, both: 2, light: 16, photon: 1 },
+        0.003,
+        "normal maps and textured lamps",
+    );
 }
 
 #[test]
@@ -122,9 +195,9 @@ fn things_that_move() {
         let lamp = glb.light(json!({"type": "point", "intensity": 0.5}), json!({}));
         glb.animate(lamp, "translation", "LINEAR", &[0.0, 1.0], &[0.7, 0.3, 0.3, 0.7, -0.5, 0.3]);
     });
-    let mut open = settings(16, 16, 16);
+    let mut open = settings(64, 64, 16);
     open.shutter = Shutter { open: 0.0, close: 1.0 };
-    agree(&glb, &open, [64, 32, 128], 0.003, "moving things");
+    agree(&glb, &open, Samples { path: 4, both: 2, light: 8, photon: 1 }, 0.003, "moving things");
 }
 
 fn block(glb: &mut Glb) -> usize {
@@ -133,15 +206,21 @@ fn block(glb: &mut Glb) -> usize {
 
 #[test]
 fn a_lens() {
-    let mut with_lens = settings(16, 16, 16);
+    let mut with_lens = settings(64, 64, 16);
     with_lens.lens = Some(Lens { radius: 0.2, focus_distance: 3.0 });
-    agree(&room(10.0, block), &with_lens, [64, 16, 32], 0.003, "lens");
+    agree(&room(10.0, block), &with_lens, Samples { path: 4, both: 1, light: 2, photon: 1 }, 0.003, "lens");
 }
 
 #[test]
 fn parallel_rays() {
     let glb = room_in_parallel(10.0, block);
-    agree(&glb, &settings(16, 16, 16), [32, 16, 64], 0.003, "parallel rays");
+    agree(
+        &glb,
+        &settings(64, 64, 16),
+        Samples { path: 2, both: 1, light: 4, photon: 1 },
+        0.003,
+        "parallel rays",
+    );
     let glb = room_in_parallel(0.0, |glb| {
         block(glb);
         glb.light(
@@ -149,11 +228,23 @@ fn parallel_rays() {
             json!({"rotation": [-0.3, 0.2, 0.0, 0.93]}),
         )
     });
-    let mut settings = in_environment(settings(16, 16, 16), 0.5);
-    agree(&glb, &settings, [32, 32, 0], 0.003, "parallel rays, sun and sky");
+    let mut settings = in_environment(settings(64, 64, 16), 0.5);
+    agree(
+        &glb,
+        &settings,
+        Samples { path: 2, both: 2, light: 0, photon: 1 },
+        0.003,
+        "parallel rays, sun and sky",
+    );
     // All rays that see the sky itself are parallel: none of its light goes there but by a probability of zero.
     settings.paths = "L(D|S)+E".to_owned();
-    agree(&glb, &settings, [32, 32, 256], 0.003, "parallel rays, lit by sun and sky");
+    agree(
+        &glb,
+        &settings,
+        Samples { path: 2, both: 2, light: 16, photon: 1 },
+        0.003,
+        "parallel rays, lit by sun and sky",
+    );
 }
 
 #[test]
