@@ -10,6 +10,7 @@ mod faults;
 mod lens;
 mod methods;
 mod motion;
+mod photons;
 mod radiosity;
 mod same_bits;
 mod techniques;
