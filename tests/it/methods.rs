@@ -69,12 +69,12 @@ fn a_sun() {
 
 #[test]
 fn a_sky() {
-    agree(&matrix::sky(), Samples { path: 2, both: 4, light: 32 });
+    agree(&matrix::sky(), Samples { path: 8, both: 6, light: 32 });
 }
 
 #[test]
 fn many_lights() {
-    agree(&matrix::many_lights(), Samples { path: 2, both: 2, light: 8 });
+    agree(&matrix::many_lights(), Samples { path: 6, both: 3, light: 8 });
 }
 
 #[test]
