@@ -53,6 +53,14 @@ pub struct Prepared {
     pub radiosity: Option<Arc<Solution>>,
 }
 
+impl Prepared {
+    /// How the scene was solved before the first sample, as JSON, where it was.
+    pub fn solution(&self) -> Option<String> {
+        let solution = self.radiosity.as_ref()?;
+        Some(serde_json::to_string(solution.report()).expect("a report is plain data"))
+    }
+}
+
 /// Makes a scene ready to be rendered: [`open`], and what the method needs beside.
 pub fn prepare(
     bytes: impl Into<Arc<[u8]>>,
