@@ -37,6 +37,8 @@ pub enum BlobName {
     Partial(JobId, BatchKey, BlobId),
     /// The first blocks of a lane as one.
     Prefix(JobId, Lane, u32),
+    /// How a job's scene was solved before the first sample.
+    Solution(JobId),
     /// A job's picture, of the set of batches that a manifest names.
     Result(JobId, String),
     /// The same, as the first version of this program named it.
@@ -56,6 +58,7 @@ impl fmt::Display for BlobName {
             Self::Prefix(job, Lane { replicate, region }, blocks) => {
                 write!(f, "{}/{region}-{replicate}-{blocks}", BlobFolder::Prefixes(job.clone()))
             }
+            Self::Solution(job) => write!(f, "jobs/{job}/solution.json"),
             Self::Result(job, manifest) => {
                 write!(f, "jobs/{job}/result-{}.exr", manifest.get(..16).unwrap_or(manifest))
             }

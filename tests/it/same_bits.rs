@@ -42,9 +42,8 @@ fn everything(scale: f64, offset: f64) -> Vec<u8> {
 }
 
 fn sum(glb: &[u8], settings: &Settings, batch: Batch, threads: usize) -> Sum {
-    let scene = scene(glb, settings);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-    pool.install(|| render(&scene, settings, batch, &Progress::new()).unwrap())
+    pool.install(|| render(&scene(glb, settings), settings, batch, &Progress::new()).unwrap())
 }
 
 #[test]
@@ -79,7 +78,9 @@ fn methods() -> Vec<(String, Settings)> {
         let filtered = Settings { layers: layers(method), ..alone.clone() };
         [(format!("{method:?}"), alone), (format!("{method:?} with layers"), filtered)]
     });
-    both.collect()
+    let mut radiosity = in_environment(settings(24, 20, 2), 0.2);
+    (radiosity.method, radiosity.paths) = (Method::Radiosity, "LD*E".to_owned());
+    both.chain([("Radiosity".to_owned(), radiosity)]).collect()
 }
 
 #[test]

@@ -150,6 +150,7 @@ impl<R: Renderer> Labour<R> {
             job: job.to_string(),
             scene: scene_id.to_string(),
             method: settings.method.name().to_owned(),
+            solution: self.renderer.solution(&scene),
         };
         let seconds = start.elapsed().as_secs_f64();
         let (lease, size, upload) = (id.clone(), settings.size, work.lease.upload.clone());

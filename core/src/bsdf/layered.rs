@@ -1,9 +1,13 @@
-//! What lies on a surface: a clear coat over cloth over what is below (`KHR_materials_clearcoat`, `KHR_materials_sheen`).
+//! What lies on a surface, and what shines through it: a clear coat over cloth over what is below
+//! (`KHR_materials_clearcoat`, `KHR_materials_sheen`), of which a share scatters to the other side
+//! (`KHR_materials_diffuse_transmission`).
 //!
 //! The coat is an interface of index 1.5 with a normal of its own, there for the share c of the surface. What it does not
 //! reflect passes: light that goes through it in two directions counts (1 − c F(o)) (1 − c F(i)), F its albedo. The
 //! fibres below let min(1 − s(o), 1 − s(i)) pass, s the largest channel of their albedo. Both are reciprocal, and with any
 //! base whose albedo is at most one the whole has one of at most one.
+//!
+//! What scatters through is coupled to the interface of both sides as the base of plastic is to that of one.
 //!
 //! They lie on both sides of a thin surface and on the outside of a solid.
 
@@ -13,6 +17,7 @@ use crate::bsdf::fresnel::Schlick;
 use crate::bsdf::gloss::Gloss;
 use crate::bsdf::kept::Kept;
 use crate::bsdf::lobe::{Drawn, Evaluated};
+use crate::bsdf::plastic::Plastic;
 use crate::bsdf::sheen::Sheen;
 use crate::bsdf::surface::{Layers, Walls};
 use crate::math::colour::{Rgb, luminance};
@@ -27,6 +32,8 @@ const COAT: Schlick = Schlick { f0: Rgb::splat(0.04), f90: 1.0 };
 pub struct Layered {
     coat: Option<Coat>,
     sheen: Option<Sheen>,
+    /// Weight of the base that scatters to the other side, and the base, seen as if it did to this.
+    through: Option<(f32, Plastic)>,
     below: Kept,
     letters: Letters,
     walls: Walls,
@@ -59,25 +66,33 @@ enum Lobe {
     Coat,
     CoatTwin,
     Sheen,
+    Through,
     Below,
 }
 
-const LOBES: [Lobe; 4] = [Lobe::Coat, Lobe::CoatTwin, Lobe::Sheen, Lobe::Below];
+const LOBES: [Lobe; 5] = [Lobe::Coat, Lobe::CoatTwin, Lobe::Sheen, Lobe::Through, Lobe::Below];
 
 impl Layered {
     /// Of lobes with one of `letters`, above and below. Numbers are within their ranges.
-    pub(super) fn new(layers: &Layers, below: Kept, letters: Letters, walls: Walls) -> Self {
+    pub(super) fn new(
+        layers: &Layers,
+        through: Option<(f32, Plastic)>,
+        below: &Kept,
+        letters: Letters,
+        walls: Walls,
+    ) -> Self {
         let coat = (layers.coat > 0.0).then(|| Coat {
             share: layers.coat,
             interface: Conductor::of(Gloss::new(layers.coat_roughness * layers.coat_roughness, COAT)),
             frame: Frame::around(layers.coat_normal),
         });
-        Self { coat, sheen: Sheen::new(layers.sheen, layers.sheen_roughness), below, letters, walls }
+        let sheen = Sheen::new(layers.sheen, layers.sheen_roughness);
+        Self { coat, sheen, through, below: *below, letters, walls }
     }
 
     pub(super) fn letters(&self) -> Letters {
         let of = |lobe| self.letter(lobe).map_or(Letters::NONE, Letters::of);
-        [Lobe::Coat, Lobe::CoatTwin, Lobe::Sheen]
+        [Lobe::Coat, Lobe::CoatTwin, Lobe::Sheen, Lobe::Through]
             .into_iter()
             .fold(self.below.letters(), |letters, lobe| letters.union(of(lobe)))
     }
@@ -91,6 +106,7 @@ impl Layered {
                 _ => return None,
             },
             Lobe::Sheen => self.sheen.as_ref().map(|_| Letter::Glossy)?,
+            Lobe::Through => self.through.as_ref().map(|_| Letter::Diffuse)?,
             Lobe::Below => return None,
         };
         self.letters.has(letter).then_some(letter)
@@ -121,8 +137,11 @@ impl Layered {
         let of = |lobe| match lobe {
             Lobe::Below => o.coat * o.sheen * self.below.luminance(wo),
             _ if !o.covered || self.letter(lobe).is_none() => 0.0,
-            Lobe::Coat if o.on_coat.z <= 0.0 => 0.0,
-            Lobe::CoatTwin if o.on_coat.z <= 0.0 => 0.0,
+            Lobe::Through => {
+                let albedo = |(weight, part): &(f32, Plastic)| weight * luminance(part.base_albedo(wo));
+                o.coat * o.sheen * self.through.as_ref().map_or(0.0, albedo)
+            }
+            Lobe::Coat | Lobe::CoatTwin if o.on_coat.z <= 0.0 => 0.0,
             Lobe::Coat => 1.0 - o.coat,
             Lobe::CoatTwin => {
                 self.coat.as_ref().map_or(0.0, |coat| coat.share * coat.interface.mirror(o.on_coat).x)
@@ -138,12 +157,24 @@ impl Layered {
 
     pub(super) fn evaluate(&self, wo: Vec3, wi: Vec3, transport: Transport) -> Evaluated {
         let (o, i) = (self.see(wo), self.see(wi));
-        let Some([coat, _, sheen, below]) = self.chances(wo, &o) else { return Evaluated::default() };
+        let Some([coat, _, sheen, through, below]) = self.chances(wo, &o) else {
+            return Evaluated::default();
+        };
         let mut all = self.below.evaluate(wo, wi, transport);
         let passes = o.coat * i.coat;
         all.value = all.value * (passes * o.sheen.min(i.sheen));
         all.pdf *= below;
-        if wo.z * wi.z <= 0.0 || !o.covered {
+        if wo.z * wi.z <= 0.0 {
+            if through > 0.0
+                && let Some((weight, part)) = &self.through
+            {
+                let one = part.evaluate_base(wo, -wi);
+                all.value.diffuse += one.value.diffuse * (weight * passes * o.sheen.min(i.sheen));
+                all.pdf += one.pdf * through;
+            }
+            return all;
+        }
+        if !o.covered {
             return all;
         }
         if sheen > 0.0
@@ -179,6 +210,7 @@ impl Layered {
         let mut drawn = match LOBES[chosen] {
             Lobe::Below => self.below.draw(wo, rest, u, transport)?,
             Lobe::Sheen => Drawn::smooth(Sheen::draw(u)),
+            Lobe::Through => Plastic::draw_base(-wo, u)?,
             Lobe::Coat => self.coat.as_ref()?.interface.draw(o.on_coat, rest, u)?,
             Lobe::CoatTwin => self.coat.as_ref()?.interface.draw_mirror(o.on_coat, Letter::Mirrored),
         };
@@ -188,7 +220,7 @@ impl Layered {
                 return None;
             }
         }
-        if !matches!(LOBES[chosen], Lobe::Below) {
+        if matches!(LOBES[chosen], Lobe::Coat | Lobe::CoatTwin | Lobe::Sheen) {
             drawn.wi.z = drawn.wi.z.copysign(wo.z);
         }
         if let Some(delta) = &mut drawn.delta {

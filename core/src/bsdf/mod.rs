@@ -37,15 +37,16 @@ use crate::bsdf::layered::Layered;
 use crate::bsdf::lobe::{Delta, Drawn, Evaluated};
 use crate::bsdf::mixture::Mixture;
 use crate::bsdf::plastic::Plastic;
-use crate::bsdf::surface::{Layers, SurfaceParameters};
+use crate::bsdf::surface::{Layers, SurfaceParameters, Walls};
 use crate::math::colour::Rgb;
 use glam::{Vec2, Vec3};
 
 /// A direction with a smaller |cos θ| lies in the surface: products of two still are normal numbers.
 const HORIZON: f32 = 1e-18;
 
-/// What a surface does to light at one point. Built at every hit: no heap, and only the variant's own part is written.
-#[derive(Clone, Copy, Debug)]
+/// What a surface does to light at one point. Built at every hit: no heap but for layers, which would make all others twice
+/// as large, and only the variant's own part is written.
+#[derive(Clone, Debug)]
 pub enum Bsdf {
     /// Ideally diffuse.
     Lambert(Lambert),
@@ -60,7 +61,7 @@ pub enum Bsdf {
     /// Some lobes of any of them.
     Kept(Kept),
     /// Any of them under a coat or cloth.
-    Layered(Layered),
+    Layered(Box<Layered>),
 }
 
 impl Bsdf {
@@ -93,16 +94,19 @@ impl Bsdf {
     #[inline(never)]
     fn layered(given: &SurfaceParameters, letters: Letters) -> Self {
         let s = clamped(given);
-        let below = match Self::whole(&s) {
-            // Nothing but diffuse: black stays black.
-            Self::Lambert(lambert) if lambert.reflectance == Rgb::ZERO => Mixture::NONE,
-            _ => mixture(&s),
-        };
-        let below = Kept::new(&below, letters);
-        match &s.layers {
-            Some(layers) => Self::Layered(Layered::new(layers, below, letters, s.walls)),
-            None => Self::Kept(below),
+        let mut below = mixture(&s);
+        let Some(layers) = &s.layers else { return Self::Kept(Kept::new(&below, letters)) };
+        let mut through = None;
+        if layers.through > 0.0
+            && s.walls == Walls::Thin
+            && let Some((weight, part)) = &mut below.plastic
+        {
+            let of = |base_color| new_plastic(&SurfaceParameters { base_color, ..s });
+            *part = of(s.base_color * (1.0 - layers.through));
+            through = Some((*weight, of(layers.through_color * layers.through)));
         }
+        let below = Kept::new(&below, letters);
+        Self::Layered(Box::new(Layered::new(layers, through, &below, letters, s.walls)))
     }
 
     fn whole(s: &SurfaceParameters) -> Self {
@@ -250,6 +254,8 @@ fn clamped(s: &SurfaceParameters) -> SurfaceParameters {
             coat_normal: layers.coat_normal,
             sheen: Rgb::from_array(layers.sheen.to_array().map(unit)),
             sheen_roughness: unit(layers.sheen_roughness),
+            through: unit(layers.through),
+            through_color: Rgb::from_array(layers.through_color.to_array().map(unit)),
         }),
     }
 }

@@ -25,6 +25,10 @@ pub struct Layers {
     pub sheen: Rgb,
     /// Perceptual roughness of the sheen.
     pub sheen_roughness: f32,
+    /// `diffuseTransmissionFactor`, in 0..=1: share of the diffuse base that scatters to the other side. Solids have none.
+    pub through: f32,
+    /// `diffuseTransmissionColorFactor`, in 0..=1.
+    pub through_color: Rgb,
 }
 
 /// A glTF metallic-roughness surface with `KHR_materials_specular`, `_ior`, `_transmission` and

@@ -11,6 +11,8 @@ pub(crate) struct Source<'a> {
     pub(crate) document: &'a Document,
     pub(crate) buffers: &'a Buffers<'a>,
     pub(crate) limits: &'a Limits,
+    /// Number of the variant of materials that is shown.
+    pub(crate) variant: Option<usize>,
 }
 
 /// Typed elements, checked to lie within their buffers.
@@ -115,8 +117,8 @@ impl Component {
     /// Whether an unsigned integer of this type reaches `index`.
     pub(crate) fn holds_index(self, index: u32) -> bool {
         match self {
-            Self::U8 => index <= u32::from(u8::MAX),
-            Self::U16 => index <= u32::from(u16::MAX),
+            Self::U8 => u8::try_from(index).is_ok(),
+            Self::U16 => u16::try_from(index).is_ok(),
             Self::U32 => true,
             Self::I8 | Self::I16 | Self::F32 => false,
         }

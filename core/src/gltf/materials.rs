@@ -201,6 +201,22 @@ impl Reader<'_> {
                 layers.sheen_roughness.texture = slot;
             }
         }
+        if let Some(through) = item.extension("KHR_materials_diffuse_transmission")? {
+            layers.through.factor = through.share("diffuseTransmissionFactor")?.unwrap_or(0.0);
+            if layers.through.factor > 0.0 {
+                let color = colour(&through, "diffuseTransmissionColorFactor")?;
+                layers.through_color.factor = color.unwrap_or(Vec3::ONE).min(Vec3::ONE);
+                layers.through.texture =
+                    self.slot(&through, "diffuseTransmissionTexture", Encoding::Linear)?;
+                layers.through_color.texture =
+                    self.slot(&through, "diffuseTransmissionColorTexture", Encoding::Srgb)?;
+                if item.extension("KHR_materials_volume")?.is_some() {
+                    let detail = "diffuse transmission into a volume is that through a thin wall: what it encloses \
+                                  does not scatter";
+                    self.problems.add(&through.pointer, detail);
+                }
+            }
+        }
         if layers != LayerMaterial::NONE {
             material.layers = Some(Box::new(layers));
         }

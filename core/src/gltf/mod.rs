@@ -19,6 +19,7 @@ mod gather;
 mod geometry;
 mod glb;
 mod guard;
+mod instancing;
 mod knots;
 mod lights;
 mod materials;
@@ -36,6 +37,7 @@ mod tangents;
 mod textures;
 mod topology;
 mod uri;
+mod variants;
 
 #[cfg(test)]
 mod tests;

@@ -63,8 +63,10 @@ static NODE: Schema = Schema {
         free("scale", Numbers(&[3], -MOST, MOST)),
         free("weights", Numbers(&[], -MOST, MOST)),
     ],
-    extensions: &[("KHR_lights_punctual", &LIGHT_OF_NODE)],
+    extensions: &[("EXT_mesh_gpu_instancing", &INSTANCING), ("KHR_lights_punctual", &LIGHT_OF_NODE)],
 };
+
+static INSTANCING: Schema = plain(&[needed("attributes", Attributes)]);
 
 static MESH: Schema = plain(&[
     free("name", Text),
@@ -131,6 +133,7 @@ static MATERIAL: Schema = Schema {
     ],
     extensions: &[
         ("KHR_materials_clearcoat", &CLEARCOAT),
+        ("KHR_materials_diffuse_transmission", &DIFFUSE_TRANSMISSION),
         ("KHR_materials_emissive_strength", &EMISSIVE_STRENGTH),
         ("KHR_materials_ior", &IOR),
         ("KHR_materials_pbrSpecularGlossiness", &SPECULAR_GLOSSINESS),
@@ -156,6 +159,13 @@ static CLEARCOAT: Schema = plain(&[
     free("clearcoatRoughnessFactor", UNIT),
     free("clearcoatRoughnessTexture", Object(&TEXTURE_INFO)),
     free("clearcoatNormalTexture", Object(&NORMAL_TEXTURE)),
+]);
+
+static DIFFUSE_TRANSMISSION: Schema = plain(&[
+    free("diffuseTransmissionFactor", UNIT),
+    free("diffuseTransmissionTexture", Object(&TEXTURE_INFO)),
+    free("diffuseTransmissionColorFactor", COLOUR),
+    free("diffuseTransmissionColorTexture", Object(&TEXTURE_INFO)),
 ]);
 
 static SHEEN: Schema = plain(&[

@@ -11,7 +11,6 @@ use crate::gltf::report::Report;
 use crate::math::colour::Rgb;
 use crate::path::expression::language::LightTag;
 use crate::path::reach::{EyeKind, LightKind, Surroundings};
-use crate::render::prepare::is_lit;
 use crate::scene::camera::{Camera, Projection};
 use crate::scene::data::SceneData;
 use crate::scene::material::{Coverage, Material, RoughnessMap};
@@ -140,7 +139,7 @@ fn features(report: &Report, data: &SceneData) -> [(&'static str, bool); 15] {
         ("emissive surfaces", any(Material::emits)),
         ("unlit surfaces", any(|m| m.unlit.is_some())),
         ("punctual lights", !data.punctual.is_empty()),
-        (DEFAULT_SKY, !is_lit(data)),
+        (DEFAULT_SKY, !data.is_lit()),
         ("animation", report.animated.nodes > 0),
         ("skins", report.animated.skins > 0),
         ("morph targets", report.animated.morphs > 0),

@@ -116,7 +116,7 @@ pub struct Material {
     pub coverage: Coverage,
 }
 
-/// A clear coat over cloth.
+/// A clear coat over cloth, and what shines through.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LayerMaterial {
     /// Share of the surface that is coated; its texture's red.
@@ -129,6 +129,10 @@ pub struct LayerMaterial {
     pub sheen: Textured<Rgb>,
     /// Perceptual roughness of the fibres; its texture's alpha.
     pub sheen_roughness: Textured<f32>,
+    /// Share of the diffuse base that scatters to the other side; its texture's alpha.
+    pub through: Textured<f32>,
+    /// Its colour.
+    pub through_color: Textured<Rgb>,
 }
 
 impl LayerMaterial {
@@ -139,16 +143,20 @@ impl LayerMaterial {
         coat_normal: None,
         sheen: Textured::constant(Vec3::ZERO),
         sheen_roughness: Textured::constant(0.0),
+        through: Textured::constant(0.0),
+        through_color: Textured::constant(Vec3::ONE),
     };
 
     /// All texture slots.
-    fn slots(&self) -> [Option<&TextureSlot>; 5] {
+    fn slots(&self) -> [Option<&TextureSlot>; 7] {
         [
             self.coat.texture.as_ref(),
             self.coat_roughness.texture.as_ref(),
             self.coat_normal.as_ref().map(|(slot, _)| slot),
             self.sheen.texture.as_ref(),
             self.sheen_roughness.texture.as_ref(),
+            self.through.texture.as_ref(),
+            self.through_color.texture.as_ref(),
         ]
     }
 
@@ -160,6 +168,8 @@ impl LayerMaterial {
             coat_normal: Vec3::Z,
             sheen: self.sheen.factor,
             sheen_roughness: self.sheen_roughness.factor,
+            through: self.through.factor,
+            through_color: self.through_color.factor,
         }
     }
 
@@ -172,6 +182,8 @@ impl LayerMaterial {
             coat_normal,
             sheen: self.sheen.factor * texel(self.sheen.texture).truncate(),
             sheen_roughness: self.sheen_roughness.factor * texel(self.sheen_roughness.texture).w,
+            through: self.through.factor * texel(self.through.texture).w,
+            through_color: self.through_color.factor * texel(self.through_color.texture).truncate(),
         }
     }
 }
@@ -252,6 +264,11 @@ impl Material {
     /// Whether it emits anywhere.
     pub fn emits(&self) -> bool {
         self.emission.factor.max_element() > 0.0
+    }
+
+    /// Whether it emits by a texture, and nowhere more than a radiance of one.
+    pub fn only_glows(&self) -> bool {
+        self.emission.texture.is_some() && self.emission.factor.max_element() <= 1.0
     }
 
     /// All texture slots that are in use.

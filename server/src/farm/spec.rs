@@ -84,6 +84,7 @@ fn before() -> Settings {
     Settings {
         size: Size { width: 1, height: 1 },
         camera: CameraChoice::Framed,
+        variant: None,
         method: Method::Path,
         paths: FULL.to_owned(),
         layers: Vec::new(),

@@ -106,6 +106,8 @@ fn layers_reflect_what_they_take() {
                     coat_normal: Vec3::Z,
                     sheen: Rgb::splat(sheen),
                     sheen_roughness: roughness,
+                    through: 1.0 - coat,
+                    through_color: Rgb::ONE,
                 };
                 let bsdf = rough(alpha, SurfaceParameters { layers: Some(layers), ..base });
                 for angle in [0.5, 50.0, 77.0, 88.5] {

@@ -43,6 +43,8 @@ fn values_are_finite_and_not_negative() {
         coat_normal: Vec3::Z,
         sheen: Rgb::ONE,
         sheen_roughness: 0.0,
+        through: 0.5,
+        through_color: Rgb::ONE,
     };
     for surface in [METAL, SOLID] {
         for (coat_roughness, sheen_roughness) in [(0.0, 0.0), (0.04, 0.3), (1.0, 1.0), (f32::NAN, f32::NAN)] {

@@ -97,6 +97,8 @@ impl Uniform {
             coat_normal: Vec3::Z,
             sheen: Rgb::new(self.next(), self.next(), self.next()) * some(self.next()),
             sheen_roughness: self.next(),
+            through: some(self.next()),
+            through_color: Rgb::new(self.next(), self.next(), self.next()),
         };
         SurfaceParameters { layers: Some(layers), ..self.surface() }
     }

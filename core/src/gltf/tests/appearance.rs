@@ -2,7 +2,9 @@
 
 use super::builder::{Builder, png};
 use crate::bsdf::surface::Walls;
-use crate::gltf::load::Loaded;
+use crate::gltf::bundle::Bundle;
+use crate::gltf::limits::Limits;
+use crate::gltf::load::{Choice, Loaded, load_as};
 use crate::scene::interaction::Side;
 use crate::scene::material::Coverage;
 use crate::trace::moment::Moment;
@@ -260,4 +262,26 @@ fn layers_are_read_with_their_textures() {
             .iter()
             .all(|material| material.layers.is_none())
     );
+}
+
+#[test]
+fn a_variant_is_chosen_by_name() {
+    let mut builder = textured(json!({"name": "plain"}));
+    builder.push("materials", json!({"name": "other"}));
+    builder.json["extensionsUsed"] = json!(["KHR_materials_variants"]);
+    builder.json["extensions"] = json!({"KHR_materials_variants": {"variants": [{"name": "red"}, {"name": "blue"}, {"name": "bare"}]}});
+    builder.json["meshes"][0]["primitives"][0]["extensions"] = json!({"KHR_materials_variants": {"mappings": [
+        {"material": 1, "variants": [1]}, {"material": 0, "variants": [0]}]}});
+    let bundle = Bundle::open(builder.glb()).unwrap();
+    let load = |variant| load_as(&bundle, &Limits::default(), &Choice { variant, ..Choice::default() });
+    for (variant, name) in
+        [(None, "plain"), (Some("red"), "plain"), (Some("blue"), "other"), (Some("bare"), "plain")]
+    {
+        let loaded = load(variant).unwrap();
+        assert_eq!(loaded.scene.material(0, 0).name, name);
+        assert_eq!(loaded.report.variants, ["red", "blue", "bare"]);
+        assert!(loaded.warnings.iter().all(|w| !w.detail.contains("variant")), "{:?}", loaded.warnings);
+    }
+    let error = load(Some("green")).unwrap_err().to_string();
+    assert!(error.contains("\"green\"") && error.contains("\"blue\""), "{error}");
 }

@@ -134,7 +134,7 @@ fn meshopt() -> Builder {
     let indices = builder.accessor(&corners, U32, "SCALAR", 3);
     builder.primitive(&json!({"attributes": {"POSITION": position}, "indices": indices}));
     let mut room = Workspace::default();
-    let oldest = VertexEncoding { version: 0, ..VertexEncoding::DEFAULT };
+    let oldest = VertexEncoding::new(0, 2).unwrap();
     let vertices = encode_vertex_buffer(&bytes(&TRIANGLE), 3, 12, oldest, &mut room).unwrap();
     compress(&mut builder, 0, &vertices, (3, 12), "ATTRIBUTES");
     let triangles = encode_index_buffer(&[0, 1, 2], IndexEncoding::DEFAULT, &mut room).unwrap();
@@ -159,7 +159,7 @@ fn broken_meshopt_is_refused_by_name() {
     let pointer = "/bufferViews/0/extensions/EXT_meshopt_compression";
     for (member, value) in [
         ("buffer", json!(7)),
-        ("byteLength", json!(1 << 40)),
+        ("byteLength", json!(1_u64 << 40)),
         ("byteLength", json!(3)),
         ("byteStride", json!(13)),
         ("count", json!(0)),
