@@ -5,7 +5,7 @@ use crate::{
     blobs::{BlobError, Blobs},
     farm::{Farm, error::FarmError, rules::Rules},
     inspect::inspect,
-    store::{error::StoreError, sqlite::Sqlite},
+    store::{Store, error::StoreError, sql::Sql},
 };
 use ovtigre_core::gltf::limits::Limits;
 use std::{
@@ -27,8 +27,12 @@ const LAST_REQUESTS: Duration = Duration::from_secs(5);
 pub struct ServeConfig {
     /// Address to listen on; port 0 takes a free one.
     pub listen: SocketAddr,
-    /// Folder of database and blobs; made where it is not there.
+    /// Folder of database and blobs, where they are not elsewhere; made where it is not there.
     pub data: PathBuf,
+    /// A PostgreSQL server, `postgres://…`, instead of a database in the folder.
+    pub database: Option<String>,
+    /// A bucket, `s3://bucket/prefix`, instead of files in the folder.
+    pub blobs: Option<String>,
 }
 
 /// Why a farm does not listen.
@@ -72,18 +76,25 @@ pub struct Serving {
     farm: Arc<Farm>,
     closing: CancellationToken,
     server: JoinHandle<io::Result<()>>,
-    /// Held until the end: keeps others from the data folder.
-    _lock: File,
+    /// Held until the end: keeps others from the database in the data folder.
+    _lock: Option<File>,
 }
 
-/// Opens the data folder, takes up what was under way, and listens.
+/// Opens database and blobs, takes up what was under way, and listens.
 pub async fn start(config: ServeConfig) -> Result<Serving, ServeError> {
-    let lock = lock(&config.data)?;
+    let lock = if config.database.is_none() { Some(lock(&config.data)?) } else { None };
     let listening = |error| ServeError::Listen { address: config.listen, error };
     let listener = TcpListener::bind(config.listen).await.map_err(listening)?;
     let address = listener.local_addr().map_err(listening)?;
-    let store = Arc::new(Sqlite::open(&config.data.join("farm.sqlite")).await?);
-    let blobs = Blobs::folder(&config.data.join("blobs"))?;
+    let store: Arc<dyn Store> = match &config.database {
+        Some(url) => Arc::new(Sql::server(url).await?),
+        None => Arc::new(Sql::file(&config.data.join("farm.sqlite")).await?),
+    };
+    let blobs = match &config.blobs {
+        Some(url) => Blobs::bucket(url)?,
+        None => Blobs::folder(&config.data.join("blobs"))?,
+    };
+    blobs.ping().await?;
     let farm = Farm::open(store, blobs, inspect(Limits::default()), Rules::default()).await?;
     let closing = CancellationToken::new();
     let closed = closing.clone().cancelled_owned();
@@ -136,7 +147,8 @@ mod tests {
     };
 
     fn config(data: &Path) -> ServeConfig {
-        ServeConfig { listen: ([127, 0, 0, 1], 0).into(), data: data.to_owned() }
+        let listen = ([127, 0, 0, 1], 0).into();
+        ServeConfig { listen, data: data.to_owned(), database: None, blobs: None }
     }
 
     /// What comes until `end` is in it, or the connection ends.

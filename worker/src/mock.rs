@@ -68,6 +68,7 @@ pub(crate) fn lease(n: u32, seconds: f64) -> Lease {
             block: Block { index: n, start: n, count: 1 },
         },
         seconds,
+        upload: None,
     }
 }
 

@@ -41,7 +41,7 @@ pub fn router(farm: Arc<Farm>) -> Router {
         .route("/v1/workers", post(workers::join).get(workers::list))
         .route("/v1/workers/{id}", get(workers::get).delete(workers::drain))
         .route("/v1/workers/{id}/exchange", post(workers::exchange))
-        .route("/v1/leases/{id}/sum", put(leases::sum))
+        .route("/v1/leases/{id}/sum", put(leases::sum).post(leases::handed))
         .route("/v1/leases/{id}/failure", post(leases::failure))
         .route("/v1/scaling", get(health::scaling))
         .route("/healthz", get(health::alive))

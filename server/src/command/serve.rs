@@ -24,6 +24,15 @@ pub(crate) struct Serve {
     /// Folder of the farm's memory: jobs, scenes, sums and pictures; made where it is not there.
     #[arg(long, value_name = "DIR", default_value = "ovtigre-data")]
     data: PathBuf,
+    /// Keep jobs in a PostgreSQL database instead, postgres://USER:PASSWORD@HOST:PORT/DATABASE; any number of farms over
+    /// the same database and blobs are one farm. [env: OVTIGRE_DATABASE]
+    #[arg(long, value_name = "URL")]
+    database: Option<String>,
+    /// Keep scenes, sums and pictures in a bucket of an S3-compatible service instead, s3://BUCKET/PREFIX; keys, region
+    /// and endpoint as for the service's own programs: AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY, AWS_REGION,
+    /// AWS_ENDPOINT_URL. [env: OVTIGRE_BLOBS]
+    #[arg(long, value_name = "URL")]
+    blobs: Option<String>,
     /// Worker processes to start on this machine.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(..=1024))]
     workers: u32,
@@ -50,7 +59,11 @@ impl Serve {
         terminal::log(&self.log);
         let interrupt = Interrupt::listen();
         let cache = self.data.join("worker-scenes");
-        let config = ServeConfig { listen: self.listen, data: self.data };
+        // A password in the environment is not in the list of processes.
+        let named = |flag: Option<String>, name| flag.or_else(|| std::env::var(name).ok());
+        let database = named(self.database, "OVTIGRE_DATABASE");
+        let blobs = named(self.blobs, "OVTIGRE_BLOBS");
+        let config = ServeConfig { listen: self.listen, data: self.data, database, blobs };
         let serving = start(config).await.map_err(|e| CommandError::wrong(e.to_string()))?;
         terminal::result(&format!("http://{}", serving.address));
         let workers = LocalWorkers::start(&Team {

@@ -14,7 +14,7 @@ use crate::{
 };
 use bytes::Bytes;
 use ovtigre_core::film::{append::Prefix, exr, schedule::Schedule, sum::Sum};
-use ovtigre_proto::id::JobId;
+use ovtigre_proto::id::{BlobId, JobId};
 use std::{
     collections::{BTreeMap, VecDeque},
     sync::Arc,
@@ -109,6 +109,12 @@ impl Merge {
             let sum = arrival.sum.or(before.and_then(|b| b.sum));
             self.waiting.insert(batch, Arrival { row: arrival.row, sum });
         }
+    }
+
+    /// Takes up what was brought to and looked at by whoever appends.
+    pub(super) fn follow(&mut self, commits: Vec<CommitRow>, checkpoints: u32) {
+        self.checkpoints = self.checkpoints.max(checkpoints);
+        commits.into_iter().for_each(|row| self.add(Arrival { row, sum: None }));
     }
 
     /// Keeps at most `bytes` of decoded sums among what waits: the others are read from their blobs
@@ -221,6 +227,10 @@ impl Farm {
         let mut held = Arc::clone(&live.merge).lock_owned().await;
         if held.is_none() {
             self.make_room(live);
+        }
+        if self.is_shared() && live.mandate().is_none() {
+            held = self.catch_up(live, held).await?;
+        } else if held.is_none() {
             *held = Some(self.load(live).await?);
         }
         if let Some(merge) = held.as_mut() {
@@ -229,7 +239,7 @@ impl Farm {
         Ok(held)
     }
 
-    async fn load(&self, live: &Live) -> Result<Merge> {
+    pub(super) async fn load(&self, live: &Live) -> Result<Merge> {
         let ledger = self.store.ledger(&live.id).await?;
         let mut kept = Vec::with_capacity(ledger.snapshots.len());
         for (lane, blocks) in &ledger.snapshots {
@@ -240,6 +250,7 @@ impl Farm {
         let schedule = Arc::clone(&live.schedule);
         let mut merge =
             Merge::new(schedule, live.spec.settings.planes(), kept, ledger.commits, ledger.checkpoints);
+        live.set_brought(ledger.brought);
         live.arrivals().into_iter().for_each(|arrival| merge.add(arrival));
         publish(live, &merge);
         Ok(merge)
@@ -268,6 +279,11 @@ impl Farm {
 
     /// Appends what can be, looks at checkpoints; true when the job is over.
     pub async fn advance(&self, live: &Arc<Live>) -> Result<bool> {
+        if !self.holds(live).await? {
+            // Whoever appends reads from the store what was brought.
+            live.arrivals();
+            return Ok(false);
+        }
         let mut held = self.sums(live).await?;
         loop {
             if self.stopping.is_cancelled() {
@@ -300,6 +316,14 @@ impl Farm {
         }
     }
 
+    /// Appends what can be, and writes nothing down.
+    pub(super) async fn append_all(&self, live: &Live, mut held: Held) -> Result<Held> {
+        while let Next::Append(ready) = held.as_mut().expect("loaded by the caller").advance() {
+            held = self.append(live, held, ready).await?;
+        }
+        Ok(held)
+    }
+
     async fn append(&self, live: &Live, mut held: Held, ready: Vec<Arrival>) -> Result<Held> {
         let mut sums = Vec::with_capacity(ready.len());
         let mut bytes = 0;
@@ -316,7 +340,7 @@ impl Farm {
             let merge = held.as_mut().expect("loaded by the caller");
             for (row, source) in sums {
                 let region = merge.schedule.regions()[row.batch.region as usize];
-                let sum = source.decode(region.pixels())?;
+                let sum = source.decode(region.pixels(), &row)?;
                 merge.append(&row, &sum)?;
             }
             Ok(held)
@@ -347,7 +371,7 @@ impl Farm {
             .await?;
             held = back;
             self.blobs.put(&BlobName::Prefix(live.id.clone(), lane, blocks), bytes.into()).await?;
-            self.store.set_snapshot(&live.id, lane, blocks).await?;
+            self.store.set_snapshot(&live.id, Self::mandate(live)?, lane, blocks).await?;
             held.as_mut().expect("loaded by the caller").snapshots.insert(lane, blocks);
             self.forget_partials(live, lane, since, blocks).await?;
         }
@@ -379,12 +403,17 @@ impl Source {
         }
     }
 
-    fn decode(self, pixels: usize) -> Result<Sum> {
+    fn decode(self, pixels: usize, row: &CommitRow) -> Result<Sum> {
         match self {
             Self::Decoded(sum) => Ok(sum),
             Self::Partial(bytes) => {
                 let read = exr::read_partial(&bytes, pixels);
-                read.map(|(sum, _)| sum).map_err(|e| FarmError::Damaged(e.to_string()))
+                let (sum, _) = read.map_err(|e| FarmError::Damaged(e.to_string()))?;
+                if BlobId::of(sum.hash()) != row.hash {
+                    let batch = row.batch;
+                    return Err(FarmError::Damaged(format!("the sum of {batch} is not the one that counts")));
+                }
+                Ok(sum)
             }
         }
     }

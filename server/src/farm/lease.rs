@@ -6,14 +6,19 @@ use super::{
     counters::Fate,
     crew::Member,
     error::{FarmError, Result, fault},
+    ids::batch_of,
 };
-use crate::store::row::{Claim, LeaseRow, Released};
+use crate::{
+    blobs::BlobName,
+    store::row::{Claim, LeaseRow, Released},
+};
 use ovtigre_proto::{
-    id::{LeaseId, WorkerId},
+    id::{JobId, LeaseId, WorkerId},
     lease::{Exchange, ExchangeReply, FailureKind, Lease, LeaseFailure, WorkerJoin, WorkerJoined},
     status::WorkerState,
 };
 use std::{
+    collections::BTreeSet,
     pin::pin,
     time::{Duration, Instant},
 };
@@ -22,6 +27,8 @@ use std::{
 const TEXT_MAX: usize = 200;
 /// Tags of a worker, at most.
 const TAGS_MAX: usize = 64;
+/// Where a sum may be put directly, that is so for so long after its lease was given.
+const UPLOAD: Duration = Duration::from_hours(12);
 
 impl Farm {
     /// A worker joins.
@@ -95,9 +102,13 @@ impl Farm {
         };
         let now = Instant::now();
         let noted = known.filter(|m| m.state == state && m.noted.elapsed() < self.rules.note_beat);
-        if noted.is_none() && !self.store.see_worker(id, state).await? {
-            return Err(FarmError::not_found("worker", id));
-        }
+        let state = match noted {
+            Some(_) => state,
+            None => match self.store.see_worker(id, state).await? {
+                None => return Err(FarmError::not_found("worker", id)),
+                Some(told) => told,
+            },
+        };
         let capacity = said.wants.min(self.rules.wants_max) + said.holding.len() as u32;
         let member = Member {
             state,
@@ -126,6 +137,8 @@ impl Farm {
                         due.push(progress.lease.clone());
                     }
                     Some(_) => {}
+                    // Another server may have handed it out.
+                    None if self.is_shared() => due.push(progress.lease.clone()),
                     None => lost.push(progress.lease.clone()),
                 }
             }
@@ -136,6 +149,11 @@ impl Farm {
             for id in due {
                 match book.lease(&id) {
                     Some(held) if renewed.contains(&id) => held.renewed = Instant::now(),
+                    None if renewed.contains(&id)
+                        && let Some((job, batch)) = batch_of(&id) =>
+                    {
+                        book.hold(LeaseRow { id, job, batch, worker: worker.clone() });
+                    }
                     _ => lost.push(id),
                 }
             }
@@ -145,11 +163,33 @@ impl Farm {
 
     async fn hand_out(&self, worker: &WorkerId, said: &Exchange) -> Result<Vec<Lease>> {
         let wants = said.wants.min(self.rules.wants_max);
+        let mut leases = Vec::new();
+        // Another server may have been faster: what is left is known after the first try.
+        for _ in 0..3 {
+            let (handed_out, refused) = self.claim_offers(worker, said, wants - leases.len() as u32).await?;
+            leases.extend(handed_out);
+            if refused.is_empty() || !self.is_shared() {
+                break;
+            }
+            for job in &refused {
+                self.refresh_plan(job).await?;
+            }
+        }
+        Ok(leases)
+    }
+
+    /// Claims what the book offers; also returns the jobs of whose batches some were refused.
+    async fn claim_offers(
+        &self,
+        worker: &WorkerId,
+        said: &Exchange,
+        wants: u32,
+    ) -> Result<(Vec<Lease>, BTreeSet<JobId>)> {
         // Twice what workers hold or would take: none stands idle while a checkpoint is taken.
         let ahead = 2 * self.crew().capacity(self.rules.silence);
         let offers = self.book().offer(wants, &said.scenes, ahead);
         if offers.is_empty() {
-            return Ok(Vec::new());
+            return Ok((Vec::new(), BTreeSet::new()));
         }
         let claims: Vec<Claim> = (offers.iter())
             .map(|Offer { job, batch, .. }| Claim {
@@ -170,15 +210,17 @@ impl Farm {
             }
         };
         let mut leases = Vec::new();
-        let mut begun = Vec::new();
+        let (mut begun, mut refused) = (Vec::new(), BTreeSet::new());
         for ((offer, claim), claimed) in offers.into_iter().zip(claims).zip(claimed) {
             let batch = self.live(&offer.job).and_then(|live| live.batch(offer.batch));
             // Not claimed: the job was paused or ended meanwhile.
             let (true, Some(batch)) = (claimed, batch) else {
                 self.book().put_back(&offer.job, offer.batch);
+                refused.insert(offer.job);
                 continue;
             };
             let Claim { lease, job, batch: key, worker } = claim;
+            let upload = self.upload_to(&lease).await;
             self.book().hold(LeaseRow { id: lease.clone(), job: job.clone(), batch: key, worker });
             leases.push(Lease {
                 id: lease,
@@ -187,12 +229,20 @@ impl Farm {
                 settings: offer.settings.as_ref().clone(),
                 batch,
                 seconds: self.rules.lease.as_secs_f64(),
+                upload,
             });
             begun.push(job);
         }
         begun.dedup();
         begun.iter().filter_map(|job| self.live(job)).for_each(|live| live.changed());
-        Ok(leases)
+        Ok((leases, refused))
+    }
+
+    /// Where a lease's sum may be put directly.
+    async fn upload_to(&self, lease: &LeaseId) -> Option<String> {
+        let address = self.blobs.address_to_put(&BlobName::Handed(lease.clone()), UPLOAD).await;
+        // Without one it is brought to the farm.
+        address.inspect_err(|error| tracing::warn!(%error, "no address to put sums at")).ok().flatten()
     }
 
     /// A worker gives a batch back.

@@ -27,6 +27,10 @@ pub struct Rules {
     pub fresh_bytes: u64,
     /// A lane's blocks since its last blob of sums, at most: so many partials are kept.
     pub partials_kept: u32,
+    /// A server that was not heard of for so long loses the jobs whose sums it appends to.
+    pub mandate: Duration,
+    /// Mandates are lengthened, and pictures' progress is told to other servers, so often.
+    pub keep_mandate: Duration,
     /// Batches given to a worker at a time.
     pub wants_max: u32,
     /// A batch that so many workers gave back with a reason fails its job.
@@ -57,6 +61,8 @@ impl Default for Rules {
             sums_bytes: 4 << 30,
             fresh_bytes: 256 << 20,
             partials_kept: 8,
+            mandate: Duration::from_secs(5),
+            keep_mandate: Duration::from_secs(1),
             wants_max: 64,
             failing_workers: 3,
             failures: 5,

@@ -5,4 +5,5 @@ mod ending;
 mod faults;
 mod layers;
 mod merging;
+mod replicas;
 mod submitting;
