@@ -7,6 +7,7 @@ mod caustics;
 mod closed_forms;
 mod expressions;
 mod faults;
+mod gltf;
 mod lens;
 mod methods;
 mod motion;

@@ -42,6 +42,7 @@ pub fn settings(width: u32, height: u32, replicates: u32) -> Settings {
     Settings {
         size: Size { width, height },
         camera: CameraChoice::Index(0),
+        variant: None,
         method: Method::Path,
         paths: FULL.to_owned(),
         layers: Vec::new(),
