@@ -250,7 +250,7 @@ impl<'a, S: State, T: Throughput<S>> Walk<'a, S, T> {
             Transport::Importance => 1.0,
         };
         self.scatterings += 1;
-        if density != Density::Delta {
+        if next.density != Density::Delta {
             self.sight = Sight::Scattered;
         }
         if self.scatterings >= ROULETTE_FROM && !self.survives(choice.y) {

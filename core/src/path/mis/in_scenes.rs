@@ -221,6 +221,7 @@ fn settings(weights: Weights) -> Settings {
     Settings {
         size: SIZE,
         camera: CameraChoice::Index(0),
+        variant: None,
         method: Method::Bidirectional,
         paths: FULL.to_owned(),
         layers: Vec::new(),
