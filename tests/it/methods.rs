@@ -21,7 +21,6 @@ fn agree(Case { what, glb, settings }: &Case, samples: Samples) {
     for (method, samples) in [(Method::Path, samples.path), (Method::Light, samples.light)] {
         if samples > 0 {
             let other = rendered(glb, &by(method), samples);
-            eprintln!("{what} {method:?} {:?} {:?}", other.mean(), both.mean());
             both.assert_same(&other, 0.003, &format!("{what}: bidirectional and {method:?}"));
         }
     }

@@ -8,7 +8,12 @@ use ovtigre_core::{
         size::Region,
         sum::Sum,
     },
-    render::{batch::render, progress::Progress},
+    radiosity::{fineness::Fineness, solution::Solution},
+    render::{
+        batch::render,
+        prepare::{Prepared, open},
+        progress::Progress,
+    },
     settings::{Layer, Lens, Method, Settings, Shows, Strategy},
 };
 use ovtigre_tests::{
@@ -17,6 +22,7 @@ use ovtigre_tests::{
     scenes::{cuboid, floor, glass, lambert, sphere},
 };
 use serde_json::json;
+use std::sync::Arc;
 
 /// A small scene with a bit of everything, all lengths times `scale`, then moved by `offset` along each axis.
 fn everything(scale: f64, offset: f64) -> Vec<u8> {
@@ -41,9 +47,20 @@ fn everything(scale: f64, offset: f64) -> Vec<u8> {
     glb.finish_under(json!({"scale": [scale, scale, scale], "translation": [offset, offset, offset]}))
 }
 
+/// A scene ready to be rendered; radiosity by fewer patches and rays than a picture's.
+fn solved(glb: &[u8], settings: &Settings) -> Prepared {
+    if settings.method != Method::Radiosity {
+        return scene(glb, settings);
+    }
+    let scene = open(glb, None, settings).unwrap();
+    let fineness = Fineness { even: 256, most: 512, refinements: 1, rays: 32 };
+    let solution = Solution::new(&scene, settings.shadows, None, fineness).unwrap();
+    Prepared { scene, radiosity: Some(Arc::new(solution)) }
+}
+
 fn sum(glb: &[u8], settings: &Settings, batch: Batch, threads: usize) -> Sum {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-    pool.install(|| render(&scene(glb, settings), settings, batch, &Progress::new()).unwrap())
+    pool.install(|| render(&solved(glb, settings), settings, batch, &Progress::new()).unwrap())
 }
 
 #[test]
@@ -104,7 +121,7 @@ fn every_method_gives_the_same_bits_on_any_number_of_threads() {
 fn blocks_of_every_method_add_up_to_the_same_sum() {
     let glb = everything(1.0, 0.0);
     for (what, settings) in methods() {
-        let scene = scene(&glb, &settings);
+        let scene = solved(&glb, &settings);
         let cut = |counts: &[u32]| {
             let mut sums =
                 vec![vec![[0.0_f64; 3]; settings.size.frame().pixels()]; settings.planes() as usize];

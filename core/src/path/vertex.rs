@@ -3,6 +3,7 @@
 use crate::bsdf::Bsdf;
 use crate::bsdf::event::{Letter, Letters, SampleKind, Scattered, Transport};
 use crate::math::colour::Rgb;
+use crate::math::cosine::cosine;
 use crate::scene::interaction::Interaction;
 use crate::trace::ray::Ray;
 use glam::{Vec2, Vec3};
@@ -148,8 +149,8 @@ impl<'s> Vertex<'s> {
 
     /// |cos θ| of a direction and the geometric normal.
     #[inline]
-    pub fn cos(&self, direction: Vec3) -> f32 {
-        direction.dot(self.at.ng).abs()
+    pub fn cos(&self, direction: Vec3) -> f64 {
+        cosine(direction, self.at.ng)
     }
 
     /// The point moved off the surface towards `direction`.

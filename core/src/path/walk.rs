@@ -2,6 +2,7 @@
 
 use crate::bsdf::event::Transport;
 use crate::math::colour::Rgb;
+use crate::math::cosine::{cosine, squared_distance};
 use crate::path::connect::light_vertex::LightStart;
 use crate::path::media::Media;
 use crate::path::mis::exhaustive::{Ends, Link};
@@ -215,16 +216,17 @@ impl<'a, S: State, T: Throughput<S>> Walk<'a, S, T> {
     /// Squared length of the edge up to `position`, or one where its density is over places.
     pub fn squared(&self, position: Vec3) -> f64 {
         match self.edge.kind {
-            EdgeKind::Directions => f64::from((position - self.edge.from).length_squared()),
+            EdgeKind::Directions => squared_distance(position, self.edge.from),
             EdgeKind::Parallel => 1.0,
         }
     }
 
-    fn arrive(&mut self, at: &Interaction<'_>) {
+    /// Reaches a surface.
+    pub(in crate::path) fn arrive(&mut self, at: &Interaction<'_>) {
         let back = -self.edge.ray.direction;
         let distance = (at.position - self.edge.ray.origin).length();
         self.carried.scale(self.media.transmittance_to(distance, at, back));
-        let (squared, cos) = (self.squared(at.position), f64::from(back.dot(at.ng).abs()));
+        let (squared, cos) = (self.squared(at.position), cosine(back, at.ng));
         self.partial.arrive(self.rules.heuristic(), squared, cos);
         if self.keeps_links() {
             let forward = self.edge.density.over_solid_angle() * cos / squared;
@@ -239,30 +241,35 @@ impl<'a, S: State, T: Throughput<S>> Walk<'a, S, T> {
         let choice = self.sampler.pair(self.dimension(Use::Choice));
         let u = self.sampler.pair(self.dimension(Use::Direction));
         let Some(next) = vertex.sample(choice.x, u, self.transport) else { return false };
-        let Continuation { direction, weight, density, eta, crossing } = next;
-        self.carried = self.carried.scattered(&self.rules.language, weight);
+        self.carried = self.carried.scattered(&self.rules.language, next.weight);
         if self.carried.is_dead() {
             return false;
         }
         self.eta_squared *= match self.transport {
-            Transport::Radiance => eta * eta,
+            Transport::Radiance => next.eta * next.eta,
             Transport::Importance => 1.0,
         };
         self.scatterings += 1;
-        if density != Density::Delta {
+        if next.density != Density::Delta {
             self.sight = Sight::Scattered;
         }
         if self.scatterings >= ROULETTE_FROM && !self.survives(choice.y) {
             return false;
         }
-        let cos = f64::from(vertex.cos(direction));
+        self.follow::<V>(vertex, &next);
+        true
+    }
+
+    /// Takes the edge that a continuation leads to.
+    pub(in crate::path) fn follow<V: Visitor<'a, S, T>>(&mut self, vertex: &Vertex<'_>, next: &Continuation) {
+        let Continuation { direction, density, crossing, .. } = *next;
+        let cos = vertex.cos(direction);
         self.look_back::<V>(vertex, direction, density, cos);
         if crossing == Crossing::Crosses {
             self.media.cross(&vertex.at, direction);
         }
         let ray = vertex.ray(direction);
         self.edge = Edge { ray, from: vertex.at.position, cos, density, kind: EdgeKind::Directions };
-        true
     }
 
     fn survives(&mut self, u: f32) -> bool {

@@ -51,7 +51,7 @@ pub struct Emission {
     /// place over the area of a disk that the scene's sphere shows (light from infinitely far).
     pub pdf: f32,
     /// |cos θ| at the surface; one for other lights.
-    pub cos: f32,
+    pub cos: f64,
 }
 
 impl Lights {
@@ -108,7 +108,7 @@ impl Lights {
         moment: Moment,
         light: u32,
         towards: Vec3,
-        cos: f32,
+        cos: f64,
     ) -> EmissionDensity {
         let (origin, emission) = match *self.light(light) {
             Light::Triangle { instance, triangle } => {
@@ -146,10 +146,10 @@ impl Place<'_> {
 }
 
 /// Density of [`Place::emit`] over solid angle for a direction at the given cosine to a surface's normal.
-fn surface_direction_pdf(sides: Sides, cos: f32) -> f32 {
+fn surface_direction_pdf(sides: Sides, cos: f64) -> f32 {
     match sides {
-        Sides::Front => warp::cosine_hemisphere_pdf(cos),
-        Sides::Both => 0.5 * cos.abs() * FRAC_1_PI,
+        Sides::Front => warp::cosine_hemisphere_pdf(cos as f32),
+        Sides::Both => 0.5 * cos as f32 * FRAC_1_PI,
     }
 }
 
@@ -172,7 +172,8 @@ fn from_surface(at: &Interaction<'_>, lobe: f32, u: Vec2) -> Emission {
     let normal = if side == Side::Back { -at.ng } else { at.ng };
     let local = warp::cosine_hemisphere(u);
     let direction = Frame::around(normal).to_world(local).normalize();
-    let cos = direction.dot(normal);
+    // Not below: a direction that rounding turned to the other side carries nothing.
+    let cos = direction.as_dvec3().dot(normal.as_dvec3());
     Emission {
         ray: Ray::new(at.leave(direction), direction),
         radiance: at.emission(side) * at.alpha(),

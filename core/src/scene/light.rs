@@ -1,6 +1,7 @@
 //! One light, and next events towards it.
 
 use crate::math::colour::Rgb;
+use crate::math::cosine::{cosine, squared_distance};
 use crate::math::spherical_triangle::SphericalTriangle;
 use crate::math::warp;
 use crate::scene::data::SceneData;
@@ -43,7 +44,9 @@ pub struct NextEvent {
     /// Density over solid angle at the point; one for a light without extent.
     pub pdf: f32,
     /// |cos θ| at the light's surface; one for other lights.
-    pub cos: f32,
+    pub cos: f64,
+    /// Squared distance; one for light from infinitely far.
+    pub squared: f64,
     /// Whether directions sampled from a BSDF can find this light, too.
     pub found_by: FoundBy,
     /// Where the shadow ray ends.
@@ -93,6 +96,7 @@ impl Light {
                     radiance,
                     pdf,
                     cos: 1.0,
+                    squared: 1.0,
                     found_by,
                     end: ShadowEnd::Infinity,
                 })
@@ -115,6 +119,11 @@ pub fn triangle_pdf(
     if let Some(spherical) = by_solid_angle(corners, point) {
         return 1.0 / spherical.solid_angle();
     }
+    pdf_by_area(corners, point, at, direction)
+}
+
+/// Density over solid angle at `point` of a uniform choice over a triangle's area.
+fn pdf_by_area(corners: [Vec3; 3], point: Vec3, at: &Interaction<'_>, direction: Vec3) -> f32 {
     let cos = at.ng.dot(direction).abs();
     (at.position - point).length_squared() / (cos * area(corners)).max(f32::MIN_POSITIVE)
 }
@@ -143,24 +152,21 @@ fn sample_triangle(
         None => (warp::triangle(u), None),
     };
     let at = data.emitter(instance, triangle, mesh_order(data, instance, barycentric), moment);
-    let (direction, distance) =
-        (at.position - point).try_normalize().map(|d| (d, (at.position - point).length()))?;
+    let direction = (at.position - point).try_normalize()?;
     let cos = -at.ng.dot(direction);
     let side = if cos > 0.0 { Side::Front } else { Side::Back };
     let radiance = at.emission(side) * at.alpha();
     if cos == 0.0 || radiance == Vec3::ZERO {
         return None;
     }
-    let pdf = match solid_angle {
-        Some(solid_angle) => 1.0 / solid_angle,
-        None => distance * distance / (cos.abs() * area(corners)).max(f32::MIN_POSITIVE),
-    };
+    let pdf = solid_angle.map_or_else(|| pdf_by_area(corners, point, &at, direction), |omega| 1.0 / omega);
     let end = ShadowEnd::Point(at.leave(-direction));
     (pdf.is_finite() && pdf > 0.0).then_some(NextEvent {
         direction,
         radiance,
         pdf,
-        cos: cos.abs(),
+        cos: cosine(direction, at.ng),
+        squared: squared_distance(at.position, point),
         found_by: FoundBy::Both,
         end,
     })
@@ -195,6 +201,10 @@ fn sample_punctual(kind: &PunctualKind, point: Vec3) -> Option<NextEvent> {
         let radiance = intensity / to.length_squared();
         Some((direction, radiance, ShadowEnd::Point(position)))
     };
+    let squared = |end| match end {
+        ShadowEnd::Point(position) => squared_distance(position, point),
+        ShadowEnd::Infinity => 1.0,
+    };
     let (direction, radiance, end) = match *kind {
         PunctualKind::Point { position, intensity } => towards(position, intensity)?,
         PunctualKind::Spot { position, direction: axis, intensity, inner_cos, outer_cos } => {
@@ -209,6 +219,7 @@ fn sample_punctual(kind: &PunctualKind, point: Vec3) -> Option<NextEvent> {
         radiance,
         pdf: 1.0,
         cos: 1.0,
+        squared: squared(end),
         found_by: FoundBy::NextEvent,
         end,
     })

@@ -80,7 +80,7 @@ fn unshadowed<S: Throughput<EyeState>>(
     unblocked::faded(vertex, &walk.media, event.direction, distance)
 }
 
-fn weight<S: Throughput<EyeState>>(
+pub(in crate::path) fn weight<S: Throughput<EyeState>>(
     walk: &Walk<'_, EyeState, S>,
     vertex: &Vertex<'_>,
     light: u32,
@@ -148,12 +148,9 @@ impl Around {
             event.direction,
             event.cos,
         );
-        let cos = f64::from(vertex.cos(event.direction));
-        let squared = match event.end {
-            ShadowEnd::Point(end) => f64::from((end - vertex.at.position).length_squared()),
-            ShadowEnd::Infinity => 1.0,
-        };
-        let to_light = f64::from(event.cos) / squared;
+        let cos = vertex.cos(event.direction);
+        let squared = event.squared;
+        let to_light = event.cos / squared;
         let next_event = match event.found_by {
             FoundBy::Both => f64::from(event.pdf) * to_light,
             FoundBy::NextEvent => f64::from(event.pdf),
