@@ -133,6 +133,8 @@ pub struct LayerMaterial {
     pub through: Textured<f32>,
     /// Its colour.
     pub through_color: Textured<Rgb>,
+    /// 20 over the Abbe number of its glass.
+    pub dispersion: f32,
 }
 
 impl LayerMaterial {
@@ -145,6 +147,7 @@ impl LayerMaterial {
         sheen_roughness: Textured::constant(0.0),
         through: Textured::constant(0.0),
         through_color: Textured::constant(Vec3::ONE),
+        dispersion: 0.0,
     };
 
     /// All texture slots.
@@ -170,6 +173,7 @@ impl LayerMaterial {
             sheen_roughness: self.sheen_roughness.factor,
             through: self.through.factor,
             through_color: self.through_color.factor,
+            dispersion: self.dispersion,
         }
     }
 
@@ -184,6 +188,7 @@ impl LayerMaterial {
             sheen_roughness: self.sheen_roughness.factor * texel(self.sheen_roughness.texture).w,
             through: self.through.factor * texel(self.through.texture).w,
             through_color: self.through_color.factor * texel(self.through_color.texture).truncate(),
+            dispersion: self.dispersion,
         }
     }
 }
