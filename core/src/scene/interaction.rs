@@ -61,9 +61,14 @@ impl SceneData {
     /// Share of what is behind that a triangle covers at a point; `barycentric` holds the weights of the
     /// second and the third corner (in the mesh's order).
     pub fn alpha(&self, instance: u32, triangle: u32, barycentric: Vec2) -> f32 {
+        let at = self.coordinates(instance, triangle, barycentric);
+        self.material(instance, triangle).alpha(&self.textures, &at)
+    }
+
+    /// Where on its textures such a point lies.
+    pub(super) fn coordinates(&self, instance: u32, triangle: u32, barycentric: Vec2) -> SurfaceCoordinates {
         let mesh = &self.meshes[self.instances[instance as usize].mesh.index()];
-        let material = &self.materials[mesh.materials[triangle as usize].index()];
-        material.alpha(&self.textures, &coordinates(mesh, triangle, weights(barycentric)))
+        coordinates(mesh, triangle, weights(barycentric))
     }
 
     /// The point of a triangle with the given weights of its second and third corner (in the mesh's order), at a moment.

@@ -187,6 +187,11 @@ impl Material {
         self.emission.factor.max_element() > 0.0
     }
 
+    /// Whether all of its surface emits alike.
+    pub fn emits_evenly(&self) -> bool {
+        self.emission.texture.is_none() && self.coverage == Coverage::Opaque
+    }
+
     /// All texture slots that are in use.
     pub fn slots(&self) -> impl Iterator<Item = &TextureSlot> {
         [

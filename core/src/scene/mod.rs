@@ -5,6 +5,7 @@ pub mod camera;
 pub mod data;
 pub mod distribution;
 pub mod emission;
+pub mod emitter;
 pub mod environment;
 pub mod importance;
 pub mod instance;

@@ -35,16 +35,28 @@ impl SurfacePoint {
     /// distance along a ray is computed from all three, and with the axes apart 2 % of the light between a floor at
     /// 0 and a lamp near it was lost to hits on the floor itself. A normal that points to the front in the mesh does
     /// so in a mirrored instance.
+    #[inline]
     pub fn new(vertices: [Vec3; 3], barycentric: Vec2, moved: Option<&Moved>) -> Self {
+        Self::on(&Face::new(vertices, moved), vertices, barycentric, moved)
+    }
+
+    /// The same where the triangle's face is known.
+    #[inline]
+    pub fn on(face: &Face, vertices: [Vec3; 3], barycentric: Vec2, moved: Option<&Moved>) -> Self {
         let weights = Vec3::new(1.0 - barycentric.x - barycentric.y, barycentric.x, barycentric.y);
         let (position, error) = combine(vertices, weights, moved);
-        let edges = Edges::new(vertices, moved);
-        let mut point = Self { position, error, normal: edges.normal(moved), start: position };
-        if let Some(weights) = edges.keep_away(weights, error) {
-            let (start, error) = combine(vertices, weights, moved);
-            (point.start, point.error) = (start, error.max(point.error));
+        let mut point = Self { position, error, normal: face.normal, start: position };
+        if face.is_near_edge(weights, error) {
+            point.keep_away(vertices, weights, moved);
         }
         point
+    }
+
+    #[cold]
+    fn keep_away(&mut self, vertices: [Vec3; 3], weights: Vec3, moved: Option<&Moved>) {
+        let weights = Edges::new(vertices, moved).moved_in(weights, f64::from(self.error));
+        let (start, error) = combine(vertices, weights, moved);
+        (self.start, self.error) = (start, error.max(self.error));
     }
 
     /// Where a ray that leaves in `direction` must start so that it does not meet this surface again and stays on this
@@ -67,6 +79,38 @@ fn combine(vertices: [Vec3; 3], weights: Vec3, moved: Option<&Moved>) -> (Vec3, 
             let (position, error) = moved.point_outward(position, Vec3::splat(error));
             (position, error.max_element())
         }
+    }
+}
+
+/// What all points of a triangle have in common: a third of the work of finding one.
+#[derive(Clone, Copy, Debug)]
+pub struct Face {
+    normal: Vec3,
+    /// Square of twice the triangle's area.
+    area: f64,
+    /// Squares of the lengths of its edges, each opposite to the vertex of its index.
+    squares: [f64; 3],
+}
+
+impl Face {
+    /// That of a mesh's triangle as an instance moves it.
+    #[inline]
+    pub fn new(vertices: [Vec3; 3], moved: Option<&Moved>) -> Self {
+        let edges = Edges::new(vertices, moved);
+        let area = edges.cross.length_squared();
+        Self { normal: edges.normal(moved), area, squares: edges.squares }
+    }
+
+    /// Whether a point that is known within `error` is nearer than [`FROM_EDGES`] errors to an edge.
+    #[inline]
+    fn is_near_edge(&self, weights: Vec3, error: f32) -> bool {
+        let margin = FROM_EDGES * f64::from(error);
+        let margin = margin * margin;
+        let near = |i: usize| {
+            let weight = f64::from(weights[i].max(0.0));
+            weight * weight * self.area < margin * self.squares[i]
+        };
+        near(0) || near(1) || near(2)
     }
 }
 
@@ -117,19 +161,7 @@ impl Edges {
     }
 
     /// Weights moved towards the triangle's centre until the point is [`FROM_EDGES`] errors from all edges; half way
-    /// at most, so that the points of a small triangle do not all become one. `None` where it is already.
-    #[inline]
-    fn keep_away(&self, weights: Vec3, error: f32) -> Option<Vec3> {
-        let margin = FROM_EDGES * f64::from(error);
-        let (area, margin) = (self.cross.length_squared(), margin * margin);
-        let near = |i: usize| {
-            let weight = f64::from(weights[i].max(0.0));
-            weight * weight * area < margin * self.squares[i]
-        };
-        (near(0) || near(1) || near(2)).then(|| self.moved_in(weights, f64::from(error)))
-    }
-
-    #[cold]
+    /// at most, so that the points of a small triangle do not all become one.
     fn moved_in(&self, weights: Vec3, error: f64) -> Vec3 {
         let weights = weights.as_dvec3();
         let to_centre = DVec3::splat(1.0 / 3.0) - weights;
