@@ -68,6 +68,10 @@ impl Bsdf {
     /// if that is kept, an ideal twin: what it would be at roughness 0.
     pub fn keeping(given: &SurfaceParameters, letters: Letters) -> Self {
         let s = clamped(given);
+        // Written where it is returned to: a copy of the whole costs as much as making it.
+        if letters.contains(Letters::NATURAL) && !letters.has(Letter::Mirrored) {
+            return Self::whole(&s);
+        }
         let whole = Self::whole(&s);
         let own = whole.letters();
         let twins = letters.has(Letter::Mirrored) && own.has(Letter::Glossy);

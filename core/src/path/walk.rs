@@ -162,7 +162,7 @@ impl<'a, S: State, T: Throughput<S>> Walk<'a, S, T> {
             if self.scatterings >= self.rules.bounces || !visitor.goes_on(&self) {
                 return;
             }
-            let Some(vertex) = Vertex::new(at, -self.edge.ray.direction, self.rules.letters) else { return };
+            let Some(vertex) = Vertex::new(at, -self.edge.ray.direction, self.rules) else { return };
             self.numbers = self.sampler.scattering(|what| self.dimension(what));
             visitor.scatters(&self, &vertex, tally);
             if !self.scatter(&vertex, visitor) {

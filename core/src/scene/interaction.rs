@@ -5,7 +5,7 @@ use crate::math::colour::Rgb;
 use crate::math::frame::Frame;
 use crate::scene::data::SceneData;
 use crate::scene::instance::{Handedness, Motion, Placement};
-use crate::scene::material::{Material, Sides, SurfaceCoordinates};
+use crate::scene::material::{Material, MaterialId, Sides, SurfaceCoordinates};
 use crate::scene::mesh::Mesh;
 use crate::scene::texture::Texture;
 use crate::trace::moment::Moment;
@@ -36,6 +36,8 @@ pub struct Interaction<'a> {
     pub moment: Moment,
     /// The material.
     pub material: &'a Material,
+    /// Its number.
+    pub material_id: MaterialId,
     textures: &'a [Texture],
     point: SurfacePoint,
 }
@@ -113,7 +115,8 @@ impl SceneData {
     #[inline]
     fn interaction_at(&self, point: Place<'_>, placement: &Placement, normals: Normals) -> Interaction<'_> {
         let Place { mesh, triangle, weights, moment } = point;
-        let material = &self.materials[mesh.materials[triangle as usize].index()];
+        let material_id = mesh.materials[triangle as usize];
+        let material = &self.materials[material_id.index()];
         let moved = match placement {
             Placement::Moved(moved) => Some(&moved.traced),
             Placement::World | Placement::Moving(_) => None,
@@ -127,7 +130,8 @@ impl SceneData {
             }
             Normals::Geometric => Frame::around(ng),
         };
-        Interaction { position, ng, shading, at, moment, material, textures: &self.textures, point: on }
+        let textures = &self.textures;
+        Interaction { position, ng, shading, at, moment, material, material_id, textures, point: on }
     }
 }
 
@@ -247,18 +251,6 @@ impl Interaction<'_> {
 
     /// What the surface is made of here.
     pub fn surface(&self) -> SurfaceParameters {
-        let (material, textures, at) = (self.material, self.textures, &self.at);
-        let (roughness, metallic) = material.roughness_and_metallic(textures, at);
-        let (specular, specular_color) = material.dielectric(textures, at);
-        SurfaceParameters {
-            base_color: material.base(textures, at).truncate().clamp(Vec3::ZERO, Vec3::ONE),
-            metallic,
-            roughness,
-            specular,
-            specular_color,
-            ior: material.ior,
-            transmission: material.transmitted(textures, at),
-            walls: material.walls(),
-        }
+        self.material.surface(self.textures, &self.at)
     }
 }

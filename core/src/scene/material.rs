@@ -1,6 +1,6 @@
 //! What surfaces are made of.
 
-use crate::bsdf::surface::Walls;
+use crate::bsdf::surface::{SurfaceParameters, Walls};
 use crate::math::colour::Rgb;
 use crate::scene::texture::{Texture, TextureId};
 use glam::{Affine2, Vec2, Vec3, Vec4};
@@ -259,6 +259,31 @@ impl Material {
     pub fn transmitted(&self, textures: &[Texture], at: &SurfaceCoordinates) -> f32 {
         let texel = self.transmission.texture.map_or(1.0, |slot| slot.sample(textures, at).x);
         (self.transmission.factor * texel).clamp(0.0, 1.0)
+    }
+
+    /// What the surface is made of at a point.
+    pub fn surface(&self, textures: &[Texture], at: &SurfaceCoordinates) -> SurfaceParameters {
+        let (roughness, metallic) = self.roughness_and_metallic(textures, at);
+        let (specular, specular_color) = self.dielectric(textures, at);
+        SurfaceParameters {
+            base_color: self.base(textures, at).truncate().clamp(Vec3::ZERO, Vec3::ONE),
+            metallic,
+            roughness,
+            specular,
+            specular_color,
+            ior: self.ior,
+            transmission: self.transmitted(textures, at),
+            walls: self.walls(),
+        }
+    }
+
+    /// What the surface is made of wherever the mesh has no colours; `None` where textures tell.
+    pub fn even_surface(&self) -> Option<SurfaceParameters> {
+        let textures = [self.base_color.texture, self.specular.texture, self.specular_color.texture];
+        let even = textures.iter().all(Option::is_none)
+            && self.transmission.texture.is_none()
+            && self.roughness_map.is_none();
+        even.then(|| self.surface(&[], &SurfaceCoordinates { uvs: [Vec2::ZERO; 2], colour: Vec4::ONE }))
     }
 
     /// The normal that the map says, in the frame of tangent, bitangent and normal; not of unit length.
