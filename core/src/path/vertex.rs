@@ -96,11 +96,14 @@ impl<'s> Vertex<'s> {
         if !visible {
             return None;
         }
-        let bsdf = match rules.even_bsdf(&at) {
-            Some(even) => Cow::Borrowed(even),
-            None => Cow::Owned(Bsdf::keeping(&at.surface(), rules.letters)),
-        };
-        Some(Self { at, bsdf, wo, cos_back })
+        // Put together apart, because a BSDF on its way from a variable costs a copy.
+        Some(match rules.even_bsdf(&at) {
+            Some(even) => Self { at, bsdf: Cow::Borrowed(even), wo, cos_back },
+            None => {
+                let surface = at.surface();
+                Self { at, bsdf: Cow::Owned(Bsdf::keeping(&surface, rules.letters)), wo, cos_back }
+            }
+        })
     }
 
     /// Unit direction back along the path.

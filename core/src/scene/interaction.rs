@@ -121,7 +121,11 @@ impl SceneData {
             Placement::Moved(moved) => Some(&moved.traced),
             Placement::World | Placement::Moving(_) => None,
         };
-        let on = SurfacePoint::new(mesh.corners(triangle, moment), Vec2::new(weights.y, weights.z), moved);
+        let (vertices, barycentric) = (mesh.corners(triangle, moment), Vec2::new(weights.y, weights.z));
+        let on = match (mesh.face(triangle), moved) {
+            (Some(face), None) => SurfacePoint::on(face, vertices, barycentric, None),
+            _ => SurfacePoint::new(vertices, barycentric, moved),
+        };
         let (position, ng) = (on.position, on.normal);
         let at = coordinates(mesh, triangle, weights);
         let shading = match normals {

@@ -57,12 +57,17 @@ enum SceneCoverage {
 
 impl Scene {
     /// Builds the trees, a mesh a thread, and gathers the lights.
-    pub fn new(data: SceneData, environment: Option<Environment>, views: Views) -> Result<Self, BuildError> {
+    pub fn new(
+        mut data: SceneData,
+        environment: Option<Environment>,
+        views: Views,
+    ) -> Result<Self, BuildError> {
         let trees = data.meshes.par_iter().map(Mesh::tree).collect::<Result<Vec<_>, _>>()?;
         let placements: Vec<Placement> = (data.instances.iter())
             .map(|i| Placement { mesh: i.mesh.0, to_world: i.placement.to_world() })
             .collect();
         let aggregate = Aggregate::moving(trees, &placements, |i| data.instances[i].placement.knots())?;
+        data.keep_faces();
         let opaque = data.materials.iter().all(|m| m.coverage == Coverage::Opaque);
         let coverage = if opaque { SceneCoverage::Opaque } else { SceneCoverage::Partly };
         let lights = Lights::new(&data, environment.as_ref());

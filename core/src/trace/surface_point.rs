@@ -70,7 +70,7 @@ impl SurfacePoint {
 /// A weighted mean of vertices in the world, and the bound on its error.
 #[inline]
 fn combine(vertices: [Vec3; 3], weights: Vec3, moved: Option<&Moved>) -> (Vec3, f32) {
-    let [a, b, c] = [0, 1, 2].map(|i: usize| vertices[i] * weights[i]);
+    let (a, b, c) = (vertices[0] * weights.x, vertices[1] * weights.y, vertices[2] * weights.z);
     let position = a + b + c;
     let error = gamma(7.0) * (a.abs() + b.abs() + c.abs()).max_element();
     match moved {
@@ -82,14 +82,12 @@ fn combine(vertices: [Vec3; 3], weights: Vec3, moved: Option<&Moved>) -> (Vec3, 
     }
 }
 
-/// What all points of a triangle have in common: a third of the work of finding one.
+/// What all points of a triangle have in common: most of the work of finding one.
 #[derive(Clone, Copy, Debug)]
 pub struct Face {
     normal: Vec3,
-    /// Square of twice the triangle's area.
-    area: f64,
-    /// Squares of the lengths of its edges, each opposite to the vertex of its index.
-    squares: [f64; 3],
+    /// [`FROM_EDGES`] over the height above each edge, opposite to the vertex of its index, squared.
+    closeness: Vec3,
 }
 
 impl Face {
@@ -97,20 +95,16 @@ impl Face {
     #[inline]
     pub fn new(vertices: [Vec3; 3], moved: Option<&Moved>) -> Self {
         let edges = Edges::new(vertices, moved);
-        let area = edges.cross.length_squared();
-        Self { normal: edges.normal(moved), area, squares: edges.squares }
+        let [a, b, c] = edges.squares;
+        let over_area = FROM_EDGES * FROM_EDGES / edges.cross.length_squared();
+        Self { normal: edges.normal(moved), closeness: (DVec3::new(a, b, c) * over_area).as_vec3() }
     }
 
     /// Whether a point that is known within `error` is nearer than [`FROM_EDGES`] errors to an edge.
     #[inline]
     fn is_near_edge(&self, weights: Vec3, error: f32) -> bool {
-        let margin = FROM_EDGES * f64::from(error);
-        let margin = margin * margin;
-        let near = |i: usize| {
-            let weight = f64::from(weights[i].max(0.0));
-            weight * weight * self.area < margin * self.squares[i]
-        };
-        near(0) || near(1) || near(2)
+        let weights = weights.max(Vec3::ZERO);
+        (weights * weights).cmplt(self.closeness * (error * error)).any()
     }
 }
 
