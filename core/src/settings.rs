@@ -15,6 +15,9 @@ pub struct Settings {
     pub size: Size,
     /// Where it is seen from.
     pub camera: CameraChoice,
+    /// Name of the variant of the scene's materials; `None` for those it has without.
+    #[serde(default)]
+    pub variant: Option<String>,
     /// How light is estimated.
     pub method: Method,
     /// Which paths the picture shows: a path expression.

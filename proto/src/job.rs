@@ -33,6 +33,9 @@ pub struct JobRequest {
     /// A camera's name, or its number from 0.
     #[serde(deserialize_with = "pair::name_or_number", skip_serializing_if = "Option::is_none")]
     pub camera: Option<String>,
+    /// A variant of the scene's materials, by name.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub variant: Option<String>,
     /// Samples a pixel at most.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub samples: Option<u32>,

@@ -55,6 +55,9 @@ pub struct SceneContents {
     /// The same of each camera.
     #[serde(default)]
     pub camera_aspect_ratios: Vec<Option<f64>>,
+    /// Variants of its materials, by name.
+    #[serde(default)]
+    pub variants: Vec<String>,
     /// Emitters of each kind.
     pub lights: LightCounts,
     /// Whether each camera's rays are parallel.

@@ -6,7 +6,9 @@ use crate::{
     job::JobRequest,
 };
 use jiff::Timestamp;
-use ovtigre_core::{film::size::Region, path::reach::Unreachable, settings::Settings};
+use ovtigre_core::{
+    film::size::Region, path::reach::Unreachable, radiosity::report::RadiosityReport, settings::Settings,
+};
 use serde::{Deserialize, Serialize};
 
 /// Where a job is in its life.
@@ -110,6 +112,9 @@ pub struct JobStatus {
     /// Paths that are asked for and that no technique of the method makes.
     #[serde(default)]
     pub unreachable: Vec<Unreachable>,
+    /// Where the method is `radiosity` and a sum has come: how the scene was solved, with the residual of every iteration.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub radiosity: Option<RadiosityReport>,
     /// Its layers in order.
     #[serde(default)]
     pub layers: Vec<LayerStatus>,

@@ -24,6 +24,8 @@ pub enum BlobName {
     Partial(JobId, BatchKey, BlobId),
     /// The first blocks of a lane as one.
     Prefix(JobId, Lane, u32),
+    /// How a job's scene was solved before the first sample.
+    Solution(JobId),
     /// A job's picture.
     Result(JobId),
 }
@@ -40,6 +42,7 @@ impl fmt::Display for BlobName {
             Self::Prefix(job, Lane { replicate, region }, blocks) => {
                 write!(f, "{}/{region}-{replicate}-{blocks}", BlobFolder::Prefixes(job.clone()))
             }
+            Self::Solution(job) => write!(f, "jobs/{job}/solution.json"),
             Self::Result(job) => write!(f, "jobs/{job}/result.exr"),
         }
     }

@@ -46,6 +46,7 @@ pub fn contents(found: Contents) -> SceneContents {
         materials: report.materials as u32,
         textures: report.textures as u32,
         cameras: report.camera_names,
+        variants: report.variants,
         aspect_ratio: aspects.first().copied().flatten(),
         camera_aspect_ratios: aspects,
         lights: LightCounts { emissive_triangles: report.emissive_triangles, point, spot, directional },

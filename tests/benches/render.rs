@@ -54,7 +54,12 @@ fn merge(c: &mut Criterion) {
     let batch = Schedule::new(size.frame(), 1, 1, 4).batch(0, 0, 0).expect("a first batch");
     let plane = (0..size.frame().pixels()).map(|i| [i as f32, 0.5, 1e-3 * i as f32]).collect();
     let sum = Sum { batch, planes: vec![plane], invalid: InvalidSamples::default(), rays: 1 };
-    let says = PartialAttributes { job: "j".to_owned(), scene: "s".to_owned(), method: "path".to_owned() };
+    let says = PartialAttributes {
+        job: "j".to_owned(),
+        scene: "s".to_owned(),
+        method: "path".to_owned(),
+        solution: None,
+    };
     let bytes = write_partial(&sum, size, &says);
     group.throughput(Throughput::Bytes(bytes.len() as u64));
     group.bench_function("decode", |b| b.iter(|| black_box(read_partial(&bytes, size.frame().pixels()))));

@@ -5,7 +5,7 @@ use ovtigre_core::{
     settings::{Layer, Method, Settings, Shows, Strategy},
 };
 use ovtigre_tests::{
-    picture::{rendered, settings},
+    picture::{rendered, scene, settings},
     program::Farm,
     room::room,
 };
@@ -53,8 +53,9 @@ fn batches(job: &serde_json::Value) -> u64 {
     job["batches_done"].as_u64().unwrap()
 }
 
-/// Kills a worker in the middle of a job, lets two others finish it, and asserts that its picture is that of core alone.
-fn assert_worker_may_die(settings: &Settings, samples: u32, further: &[&str]) {
+/// Kills a worker in the middle of a job, lets two others finish it, and asserts that its picture is that of core alone. The
+/// job when it is done.
+fn assert_worker_may_die(settings: &Settings, samples: u32, further: &[&str]) -> serde_json::Value {
     let folder = tempfile::tempdir().unwrap();
     let farm = Farm::start(&folder.path().join("farm"));
     let job = submit(&farm, folder.path(), settings, samples, further);
@@ -71,6 +72,7 @@ fn assert_worker_may_die(settings: &Settings, samples: u32, further: &[&str]) {
         "the picture differs from that of core alone"
     );
     assert_eq!(picture.attributes["ovtigre.job"], job);
+    done
 }
 
 #[test]
@@ -88,6 +90,33 @@ fn a_killed_worker_changes_no_byte_of_light_that_any_sample_can_add_to() {
     ];
     let further = ["--method", "bidirectional", "--layer", "b2=L.{2}E", "--layer", "C21=(2,1)"];
     assert_worker_may_die(&settings, 128, &further);
+}
+
+#[test]
+fn a_killed_worker_changes_no_byte_of_light_from_the_lights() {
+    let settings = Settings { method: Method::Light, ..plain() };
+    assert_worker_may_die(&settings, 2 * SAMPLES, &["--method", "light"]);
+}
+
+#[test]
+fn a_killed_worker_changes_no_byte_of_photons() {
+    let mut settings = settings(48, 27, 4);
+    settings.method = Method::Photon;
+    settings.layers = vec![Layer { name: "narrow".to_owned(), shows: Shows::Narrow }];
+    assert_worker_may_die(&settings, 2 * SAMPLES, &["--method", "photon"]);
+}
+
+#[test]
+fn a_killed_worker_changes_no_byte_of_radiosity_nor_its_residuals() {
+    let mut settings = plain();
+    settings.method = Method::Radiosity;
+    settings.paths = "LD*E".to_owned();
+    let done =
+        assert_worker_may_die(&settings, 2 * SAMPLES, &["--preset", "radiosity", "--method", "radiosity"]);
+    let alone = scene(&room(), &settings);
+    let report = alone.radiosity.as_ref().unwrap().report();
+    assert!(report.residuals.len() > 2 && report.residuals.is_sorted_by(|a, b| a > b), "{report:?}");
+    assert_eq!(done["radiosity"], serde_json::to_value(report).unwrap());
 }
 
 #[test]

@@ -1,174 +1,127 @@
-//! All methods agree.
+//! All methods agree: in the whole picture and in its blocks of 16×16 pixels.
 
-use glam::Vec3;
-use ovtigre_core::settings::{Layer, Lens, Method, Settings, Shows, Shutter};
+use ovtigre_core::settings::{Method, Settings};
 use ovtigre_tests::{
-    glb::Glb,
-    picture::{in_environment, rendered, settings},
-    scenes::{cuboid, glass, lambert, quad, sphere},
-    stage::{metal, plastic, room, room_in_parallel, smooth_sphere},
-    textures::{UVS, png},
+    matrix::{self, Case},
+    picture::rendered,
 };
-use serde_json::{Value, json};
 
-fn by(method: Method, settings: &Settings) -> Settings {
-    Settings { method, ..settings.clone() }
+/// Samples a pixel and replicate; 0 where a method does not make all paths.
+#[derive(Clone, Copy)]
+struct Samples {
+    path: u32,
+    both: u32,
+    light: u32,
 }
 
-/// Asserts that light from the eye, from the light and from both is the same.
-fn agree(glb: &[u8], settings: &Settings, samples: [u32; 3], power: f64, what: &str) {
-    let path = rendered(glb, &by(Method::Path, settings), samples[0]);
-    let both = rendered(glb, &by(Method::Bidirectional, settings), samples[1]);
-    path.assert_same(&both, power, &format!("{what}: path and bidirectional"));
-    if samples[2] > 0 {
-        let light = rendered(glb, &by(Method::Light, settings), samples[2]);
-        path.assert_same(&light, power, &format!("{what}: path and light"));
+/// Asserts that light from the eye, from the light and from both is the same, at an error of 0.3 % at most.
+fn agree(Case { what, glb, settings }: &Case, samples: Samples) {
+    let by = |method: Method| Settings { method, ..settings.clone() };
+    let both = rendered(glb, &by(Method::Bidirectional), samples.both);
+    for (method, samples) in [(Method::Path, samples.path), (Method::Light, samples.light)] {
+        if samples > 0 {
+            let other = rendered(glb, &by(method), samples);
+            eprintln!("{what} {method:?} {:?} {:?}", other.mean(), both.mean());
+            both.assert_same(&other, 0.003, &format!("{what}: bidirectional and {method:?}"));
+        }
     }
 }
 
 #[test]
 fn a_diffuse_room() {
-    let glb = room(10.0, |glb| {
-        glb.body(lambert(0.8, 0.0), cuboid(Vec3::new(-0.5, -1.0, -0.5), Vec3::new(0.2, 0.1, 0.2)))
-    });
-    agree(&glb, &settings(16, 16, 16), [32, 8, 16], 0.003, "diffuse");
+    agree(&matrix::diffuse(), Samples { path: 4, both: 1, light: 1 });
 }
 
 #[test]
 fn smooth_normals_gloss_and_metal() {
-    let glb = room(10.0, |glb| {
-        smooth_sphere(glb, plastic(0.3), Vec3::new(-0.4, -0.5, 0.0), 0.45);
-        smooth_sphere(glb, metal(0.4), Vec3::new(0.5, -0.4, 0.2), 0.4);
-        smooth_sphere(glb, lambert(0.8, 0.0), Vec3::new(0.1, 0.4, -0.3), 0.3);
-    });
-    agree(&glb, &settings(16, 16, 16), [32, 32, 128], 0.003, "smooth normals");
+    agree(&matrix::smooth_normals(), Samples { path: 6, both: 1, light: 8 });
 }
 
 #[test]
-fn rough_and_smooth_glass() {
-    let rough = |roughness: f32| {
-        let mut material = glass(1.5);
-        material["pbrMetallicRoughness"]["roughnessFactor"] = json!(roughness);
-        material
-    };
-    let glb = room(10.0, |glb| smooth_sphere(glb, rough(0.5), Vec3::new(0.0, -0.3, 0.0), 0.6));
-    agree(&glb, &settings(16, 16, 16), [128, 32, 256], 0.003, "rough glass");
-    let glb = room(10.0, |glb| smooth_sphere(glb, rough(0.0), Vec3::new(0.0, -0.3, 0.0), 0.6));
-    agree(&glb, &settings(16, 16, 16), [256, 64, 0], 0.003, "smooth glass");
+fn rough_glass() {
+    agree(&matrix::ball_of_glass(0.5), Samples { path: 8, both: 2, light: 16 });
+}
+
+#[test]
+fn smooth_glass() {
+    agree(&matrix::ball_of_glass(0.0), Samples { path: 16, both: 2, light: 0 });
+}
+
+#[test]
+fn coats_cloth_and_leaves() {
+    let glb = room(10.0, |glb| {
+        let mut coated = metal(0.5);
+        coated["extensions"] = json!({"KHR_materials_clearcoat":
+            {"clearcoatFactor": 1.0, "clearcoatRoughnessFactor": 0.3}});
+        smooth_sphere(glb, coated, Vec3::new(-0.5, -0.5, 0.2), 0.4);
+        let mut cloth = plastic(0.8);
+        cloth["extensions"] = json!({"KHR_materials_sheen":
+            {"sheenColorFactor": [0.9, 0.6, 0.3], "sheenRoughnessFactor": 0.4}});
+        smooth_sphere(glb, cloth, Vec3::new(0.5, -0.5, 0.2), 0.4);
+        let mut leaf = plastic(0.5);
+        leaf["extensions"] = json!({"KHR_materials_diffuse_transmission":
+            {"diffuseTransmissionFactor": 0.7, "diffuseTransmissionColorFactor": [0.4, 0.9, 0.3]}});
+        let at = |x: f32, y: f32| Vec3::new(x, y, 0.0);
+        glb.body(leaf, quad([at(-0.5, 0.2), at(0.5, 0.2), at(0.5, 0.8), at(-0.5, 0.8)]));
+    });
+    agree(&glb, &settings(16, 16, 16), [64, 32, 128], 0.003, "layers");
 }
 
 #[test]
 fn coated_plastic_and_mixtures() {
-    let glb = room(10.0, |glb| {
-        glb.body(plastic(0.0), cuboid(Vec3::new(-0.8, -1.0, -0.5), Vec3::new(-0.1, 0.0, 0.3)));
-        let mut mixed = plastic(0.3);
-        mixed["pbrMetallicRoughness"]["metallicFactor"] = json!(0.4);
-        mixed["extensions"] = json!({"KHR_materials_transmission": {"transmissionFactor": 0.5}});
-        glb.body(mixed, cuboid(Vec3::new(0.2, -1.0, -0.3), Vec3::new(0.7, 0.0, 0.4)));
-    });
-    agree(&glb, &settings(16, 16, 16), [32, 16, 0], 0.003, "coated");
+    agree(&matrix::coated(), Samples { path: 4, both: 1, light: 0 });
 }
 
 #[test]
-fn lights_of_every_kind() {
-    let half = std::f64::consts::FRAC_1_SQRT_2;
-    let down = json!({"translation": [0.2, 0.8, 0.1], "rotation": [-half, 0.0, 0.0, half]});
-    let point = room(0.0, |glb| glb.light(json!({"type": "point", "intensity": 2.0}), down.clone()));
-    agree(&point, &settings(16, 16, 16), [32, 16, 32], 0.003, "point");
-    let spot =
-        json!({"type": "spot", "intensity": 4.0, "spot": {"innerConeAngle": 0.3, "outerConeAngle": 0.8}});
-    let spot = room(0.0, |glb| glb.light(spot, down.clone()));
-    agree(&spot, &settings(16, 16, 16), [16, 16, 64], 0.003, "spot");
-    let along = json!({"rotation": [-0.3, 0.2, 0.0, 0.93]});
-    let sun = room(0.0, |glb| glb.light(json!({"type": "directional", "intensity": 3.0}), along));
-    agree(&sun, &settings(16, 16, 16), [16, 16, 64], 0.003, "sun");
-    let sky = in_environment(settings(16, 16, 16), 1.0);
-    agree(&room(0.0, |_| ()), &sky, [32, 64, 512], 0.003, "sky");
-    let both = room(4.0, |glb| {
-        glb.light(json!({"type": "point", "intensity": 1.0}), json!({"translation": [-0.5, 0.0, 0.2]}))
-    });
-    agree(&both, &sky, [32, 32, 128], 0.003, "sky, lamp and point");
+fn a_point() {
+    agree(&matrix::point(), Samples { path: 4, both: 1, light: 2 });
 }
 
-/// A quad whose material has a texture of 4×4 texels in the given place.
-fn textured(glb: &mut Glb, mut material: Value, texels: &[[u8; 4]; 16], place: &str, corners: [Vec3; 4]) {
-    let texture = glb.texture(&png(4, texels), json!({}));
-    material[place] = json!({"index": texture});
-    let material = glb.material(material);
-    let (positions, triangles) = quad(corners);
-    let mesh = glb.mesh_with(&positions, &triangles, material, &[("TEXCOORD_0", &UVS, 2)]);
-    glb.place(mesh);
+#[test]
+fn a_spot() {
+    agree(&matrix::spot(), Samples { path: 2, both: 1, light: 4 });
+}
+
+#[test]
+fn a_sun() {
+    agree(&matrix::sunny(), Samples { path: 2, both: 1, light: 4 });
+}
+
+#[test]
+fn a_sky() {
+    agree(&matrix::sky(), Samples { path: 8, both: 6, light: 32 });
+}
+
+#[test]
+fn many_lights() {
+    agree(&matrix::many_lights(), Samples { path: 6, both: 3, light: 8 });
 }
 
 #[test]
 fn normal_maps_and_textured_lamps() {
-    let at = Vec3::new;
-    let bumps = std::array::from_fn(|i| [96 + 16 * (i as u8 % 5), 88 + 20 * (i as u8 % 4), 215, 255]);
-    let glow = std::array::from_fn(|i| [if i % 3 == 0 { 255 } else { 60 }, 40 + 12 * i as u8, 90, 255]);
-    let glb = room(2.0, |glb| {
-        let raised = [at(-0.9, -0.9, 0.9), at(0.5, -0.9, 0.9), at(0.5, -0.8, -0.6), at(-0.9, -0.8, -0.6)];
-        textured(glb, plastic(0.4), &bumps, "normalTexture", raised);
-        let lamp = [at(0.6, -0.6, -0.9), at(0.95, -0.6, -0.6), at(0.95, 0.4, -0.6), at(0.6, 0.4, -0.9)];
-        textured(glb, lambert(0.2, 6.0), &glow, "emissiveTexture", lamp);
-    });
-    agree(&glb, &settings(16, 16, 16), [64, 32, 256], 0.003, "normal maps and textured lamps");
+    agree(&matrix::maps(), Samples { path: 4, both: 2, light: 16 });
 }
 
 #[test]
 fn things_that_move() {
-    let glb = room(10.0, |glb| {
-        let ball = glb.body(plastic(0.4), sphere(Vec3::new(0.0, -0.4, 0.1), 0.35, 8));
-        glb.animate(ball, "translation", "LINEAR", &[0.0, 1.0], &[-0.4, 0.0, 0.0, 0.4, 0.2, 0.0]);
-        let lamp = glb.light(json!({"type": "point", "intensity": 0.5}), json!({}));
-        glb.animate(lamp, "translation", "LINEAR", &[0.0, 1.0], &[0.7, 0.3, 0.3, 0.7, -0.5, 0.3]);
-    });
-    let mut open = settings(16, 16, 16);
-    open.shutter = Shutter { open: 0.0, close: 1.0 };
-    agree(&glb, &open, [64, 32, 128], 0.003, "moving things");
-}
-
-fn block(glb: &mut Glb) -> usize {
-    glb.body(plastic(0.4), cuboid(Vec3::new(-0.4, -1.0, -0.4), Vec3::new(0.4, -0.2, 0.4)))
+    agree(&matrix::moving(), Samples { path: 4, both: 2, light: 8 });
 }
 
 #[test]
 fn a_lens() {
-    let mut with_lens = settings(16, 16, 16);
-    with_lens.lens = Some(Lens { radius: 0.2, focus_distance: 3.0 });
-    agree(&room(10.0, block), &with_lens, [64, 16, 32], 0.003, "lens");
+    agree(&matrix::lens(), Samples { path: 4, both: 1, light: 2 });
 }
 
 #[test]
 fn parallel_rays() {
-    let glb = room_in_parallel(10.0, block);
-    agree(&glb, &settings(16, 16, 16), [32, 16, 64], 0.003, "parallel rays");
-    let glb = room_in_parallel(0.0, |glb| {
-        block(glb);
-        glb.light(
-            json!({"type": "directional", "intensity": 3.0}),
-            json!({"rotation": [-0.3, 0.2, 0.0, 0.93]}),
-        )
-    });
-    let mut settings = in_environment(settings(16, 16, 16), 0.5);
-    agree(&glb, &settings, [32, 32, 0], 0.003, "parallel rays, sun and sky");
-    // All rays that see the sky itself are parallel: none of its light goes there but by a probability of zero.
-    settings.paths = "L(D|S)+E".to_owned();
-    agree(&glb, &settings, [32, 32, 256], 0.003, "parallel rays, lit by sun and sky");
+    agree(&matrix::parallel(), Samples { path: 2, both: 1, light: 4 });
 }
 
 #[test]
-fn photons_tell_their_bias() {
-    // What photons miss around edges shrinks with their radius; half the area of gathering tells how much is missing.
-    let contents = cuboid(Vec3::new(-0.5, -1.0, -0.5), Vec3::new(0.2, 0.1, 0.2));
-    let glb = room(10.0, |glb| glb.body(lambert(0.8, 0.0), contents));
-    let settings = settings(64, 64, 16);
-    let (path, _) = rendered(&glb, &settings, 16).mean();
-    let mut photon = by(Method::Photon, &settings);
-    photon.layers.push(Layer { name: "narrow".to_owned(), shows: Shows::Narrow });
-    let picture = rendered(&glb, &photon, 8);
-    let ((wide, error), (narrow, _)) = (picture.mean(), picture.mean_of(1));
-    // What is missing around edges is in proportion to the radius.
-    let extrapolated = wide + (narrow - wide) / (1.0 - 0.5_f64.sqrt());
-    assert!(path - wide > 4.5 * error, "{path} {wide}: there is no bias to tell");
-    assert!((path - extrapolated).abs() < 0.5 * (path - wide), "{path}: {wide}, {narrow}, {extrapolated}");
+fn parallel_rays_under_a_sky() {
+    let mut case = matrix::parallel_under_sky();
+    agree(&case, Samples { path: 2, both: 2, light: 0 });
+    // All rays that see the sky itself are parallel: none of its light goes there but by a probability of zero.
+    case.settings.paths = "L(D|S)+E".to_owned();
+    agree(&case, Samples { path: 2, both: 2, light: 16 });
 }

@@ -50,9 +50,8 @@ fn everything_of(scale: f64, offset: f64, change: impl Fn(&mut Glb, Value) -> Va
 }
 
 fn sum(glb: &[u8], settings: &Settings, batch: Batch, threads: usize) -> Sum {
-    let scene = scene(glb, settings);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-    pool.install(|| render(&scene, settings, batch, &Progress::new()).unwrap())
+    pool.install(|| render(&scene(glb, settings), settings, batch, &Progress::new()).unwrap())
 }
 
 #[test]
@@ -87,7 +86,9 @@ fn methods() -> Vec<(String, Settings)> {
         let filtered = Settings { layers: layers(method), ..alone.clone() };
         [(format!("{method:?}"), alone), (format!("{method:?} with layers"), filtered)]
     });
-    both.collect()
+    let mut radiosity = in_environment(settings(24, 20, 2), 0.2);
+    (radiosity.method, radiosity.paths) = (Method::Radiosity, "LD*E".to_owned());
+    both.chain([("Radiosity".to_owned(), radiosity)]).collect()
 }
 
 /// What is alike all over a surface is found once for all of its points, and what lights have in common once for all next

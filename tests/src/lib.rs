@@ -2,6 +2,7 @@
 
 pub mod glb;
 pub mod irradiance;
+pub mod matrix;
 pub mod picture;
 pub mod program;
 pub mod room;

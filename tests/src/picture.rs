@@ -28,13 +28,13 @@ fn mean_and_error(means: &[f64]) -> (f64, f64) {
 
 /// Mean over its samples, summed over the pixels of a rectangle and all channels.
 fn sum_within(prefix: &Prefix, plane: usize, within: Region) -> f64 {
-    let region = prefix.region();
-    let inside = |i: usize| {
-        let (x, y) = (region.x + i as u32 % region.width, region.y + i as u32 / region.width);
-        (within.x..within.x + within.width).contains(&x) && (within.y..within.y + within.height).contains(&y)
+    let (region, values) = (prefix.region(), prefix.layer(plane));
+    let bottom = (within.y + within.height).min(region.y + region.height);
+    let row = |y: u32| {
+        let start = ((y - region.y) * region.width + within.x - region.x) as usize * 3;
+        values[start..start + within.width as usize * 3].iter().sum::<f64>()
     };
-    let pixels = prefix.layer(plane).chunks(3).enumerate().filter(|(i, _)| inside(*i));
-    pixels.map(|(_, rgb)| rgb.iter().sum::<f64>()).sum::<f64>() / f64::from(prefix.samples())
+    (within.y.max(region.y)..bottom).map(row).sum::<f64>() / f64::from(prefix.samples())
 }
 
 /// Settings with nothing special.
@@ -42,6 +42,7 @@ pub fn settings(width: u32, height: u32, replicates: u32) -> Settings {
     Settings {
         size: Size { width, height },
         camera: CameraChoice::Index(0),
+        variant: None,
         method: Method::Path,
         paths: FULL.to_owned(),
         layers: Vec::new(),
@@ -136,24 +137,18 @@ impl Rendered {
             .collect()
     }
 
-    /// Asserts that `other` has the same mean over the whole picture and over blocks of a quarter of its sides: within 4.5
-    /// and 6 standard errors of the difference (15 degrees of freedom and more: once in 2,400 and in 40,000), the whole
-    /// known to `power` of its mean.
-    pub fn assert_same(&self, other: &Self, power: f64, what: &str) {
+    /// The whole of a plane, then its 4×4 blocks of a quarter of each side.
+    pub fn parts(&self, plane: usize) -> Parts {
         let frame = self.settings.size.frame();
-        let compare = |within: Region, sigmas: f64| {
-            let (a, b) = (mean_and_error(&self.means(0, within)), mean_and_error(&other.means(0, within)));
-            let error = a.1.hypot(b.1);
-            let tolerance = sigmas * error + 1e-5 * a.0.abs();
-            assert!((a.0 - b.0).abs() <= tolerance, "{what}, {within}: {a:?} against {b:?}");
-            (error, a.0)
-        };
-        let (error, mean) = compare(frame, 4.5);
-        assert!(error <= power * mean, "{what}: the error {error} of {mean} is too large to find a bias");
         let (width, height) = (frame.width / 4, frame.height / 4);
-        for block in 0..16 {
-            compare(Region { x: block % 4 * width, y: block / 4 * height, width, height }, 6.0);
-        }
+        let blocks =
+            (0..16).map(|block| Region { x: block % 4 * width, y: block / 4 * height, width, height });
+        Parts(std::iter::once(frame).chain(blocks).map(|part| self.means(plane, part)).collect())
+    }
+
+    /// Asserts that `other` has the same mean over the whole picture and over its blocks, see [`Parts::assert_same`].
+    pub fn assert_same(&self, other: &Self, power: f64, what: &str) {
+        self.parts(0).assert_same(&other.parts(0), power, what);
         assert_eq!((self.invalid(), other.invalid()), (0, 0), "{what}: samples were dropped");
     }
 
@@ -166,5 +161,41 @@ impl Rendered {
         let tolerance = 4.5 * error + 1e-5 * truth;
         assert!((mean - truth).abs() <= tolerance, "{what}: {mean} ± {error}, but it should be {truth}");
         assert_eq!(self.invalid(), 0, "{what}: samples were dropped");
+    }
+}
+
+/// Means of each replicate over parts of a picture: over all of it, then over its 4×4 blocks. They do not depend on how
+/// many pixels it has.
+#[derive(Debug)]
+pub struct Parts(Vec<Vec<f64>>);
+
+impl Parts {
+    /// Of each part and replicate, what `of` makes of the means that some pictures have there.
+    pub fn combined<const N: usize>(all: [&Self; N], of: impl Fn([f64; N]) -> f64) -> Self {
+        let parts = 0..all[0].0.len();
+        let replicates = 0..all[0].0[0].len();
+        Self(parts.map(|p| replicates.clone().map(|r| of(all.map(|a| a.0[p][r]))).collect()).collect())
+    }
+
+    /// Mean and standard error over the whole picture.
+    pub fn whole(&self) -> (f64, f64) {
+        mean_and_error(&self.0[0])
+    }
+
+    /// Asserts that `other` has the same means: within 4.5 standard errors of the difference for the whole and 6 for a
+    /// block (15 degrees of freedom and more: once in 2,400 and in 40,000), the whole known to `power` of its mean.
+    pub fn assert_same(&self, other: &Self, power: f64, what: &str) {
+        for (part, (a, b)) in self.0.iter().zip(&other.0).enumerate() {
+            let (a, b) = (mean_and_error(a), mean_and_error(b));
+            let (error, sigmas) = (a.1.hypot(b.1), if part == 0 { 4.5 } else { 6.0 });
+            let where_ = if part == 0 { "all of it".to_owned() } else { format!("block {}", part - 1) };
+            let tolerance = sigmas * error + 1e-5 * a.0.abs();
+            assert!((a.0 - b.0).abs() <= tolerance, "{what}, {where_}: {a:?} against {b:?}");
+            assert!(
+                part > 0 || error <= power * a.0,
+                "{what}: the error {error} of {} is too large to find a bias",
+                a.0
+            );
+        }
     }
 }

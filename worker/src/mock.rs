@@ -38,6 +38,7 @@ pub(crate) fn settings() -> Settings {
     Settings {
         size: Size { width: 2, height: 1 },
         camera: CameraChoice::Framed,
+        variant: None,
         method: Method::Path,
         paths: FULL.to_owned(),
         layers: Vec::new(),

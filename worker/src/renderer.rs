@@ -28,6 +28,11 @@ pub trait Renderer: Send + Sync + 'static {
         settings: &Settings,
     ) -> Result<Self::Scene, String>;
 
+    /// How the scene was solved before the first sample, as JSON, where it was: the same from every worker.
+    fn solution(&self, _: &Self::Scene) -> Option<String> {
+        None
+    }
+
     /// The sum of a batch; `None` where it was stopped.
     fn render(
         &self,
@@ -56,6 +61,10 @@ impl Renderer for Core {
         settings: &Settings,
     ) -> Result<Prepared, String> {
         prepare(scene, environment, settings).map_err(|e| e.to_string())
+    }
+
+    fn solution(&self, scene: &Prepared) -> Option<String> {
+        scene.solution()
     }
 
     fn render(

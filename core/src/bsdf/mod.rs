@@ -13,9 +13,11 @@ pub mod glass;
 mod gloss;
 pub mod kept;
 pub mod lambert;
+pub mod layered;
 mod lobe;
 pub mod mixture;
 pub mod plastic;
+mod sheen;
 mod sheet;
 mod solid;
 mod solid_albedo;
@@ -31,18 +33,20 @@ use crate::bsdf::fresnel::{Schlick, dielectric_at_normal};
 use crate::bsdf::glass::Glass;
 use crate::bsdf::kept::Kept;
 use crate::bsdf::lambert::Lambert;
+use crate::bsdf::layered::Layered;
 use crate::bsdf::lobe::{Delta, Drawn, Evaluated};
 use crate::bsdf::mixture::Mixture;
 use crate::bsdf::plastic::Plastic;
-use crate::bsdf::surface::SurfaceParameters;
+use crate::bsdf::surface::{Layers, SurfaceParameters, Walls};
 use crate::math::colour::Rgb;
 use glam::{Vec2, Vec3};
 
 /// A direction with a smaller |cos θ| lies in the surface: products of two still are normal numbers.
 const HORIZON: f32 = 1e-18;
 
-/// What a surface does to light at one point. Built at every hit: no heap, and only the variant's own part is written.
-#[derive(Clone, Copy, Debug)]
+/// What a surface does to light at one point. Built at every hit: no heap but for layers, which would make all others twice
+/// as large, and only the variant's own part is written.
+#[derive(Clone, Debug)]
 pub enum Bsdf {
     /// Ideally diffuse.
     Lambert(Lambert),
@@ -56,17 +60,25 @@ pub enum Bsdf {
     Mixture(Mixture),
     /// Some lobes of any of them.
     Kept(Kept),
+    /// Any of them under a coat or cloth.
+    Layered(Box<Layered>),
 }
 
 impl Bsdf {
     /// metallic · conductor + (1 − metallic) · ((1 − transmission) · plastic + transmission · glass).
     pub fn from_surface(given: &SurfaceParameters) -> Self {
+        if given.layers.is_some() {
+            return Self::layered(given, Letters::NATURAL);
+        }
         Self::whole(&clamped(given))
     }
 
     /// The same with no lobes but those of `letters`. With the letter `S_T` among them every glossy lobe has, beside itself
     /// if that is kept, an ideal twin: what it would be at roughness 0.
     pub fn keeping(given: &SurfaceParameters, letters: Letters) -> Self {
+        if given.layers.is_some() {
+            return Self::layered(given, letters);
+        }
         let s = clamped(given);
         // Written where it is returned to: a copy of the whole costs as much as making it.
         if letters.contains(Letters::NATURAL) && !letters.has(Letter::Mirrored) {
@@ -81,6 +93,24 @@ impl Bsdf {
             Self::Lambert(_) => Self::Kept(Kept::new(&Mixture::NONE, letters)),
             _ => Self::Kept(Kept::new(&mixture(&s), letters)),
         }
+    }
+
+    #[inline(never)]
+    fn layered(given: &SurfaceParameters, letters: Letters) -> Self {
+        let s = clamped(given);
+        let mut below = mixture(&s);
+        let Some(layers) = &s.layers else { return Self::Kept(Kept::new(&below, letters)) };
+        let mut through = None;
+        if layers.through > 0.0
+            && s.walls == Walls::Thin
+            && let Some((weight, part)) = &mut below.plastic
+        {
+            let of = |base_color| new_plastic(&SurfaceParameters { base_color, ..s });
+            *part = of(s.base_color * (1.0 - layers.through));
+            through = Some((*weight, of(layers.through_color * layers.through)));
+        }
+        let below = Kept::new(&below, letters);
+        Self::Layered(Box::new(Layered::new(layers, through, &below, letters, s.walls)))
     }
 
     fn whole(s: &SurfaceParameters) -> Self {
@@ -107,6 +137,7 @@ impl Bsdf {
             Self::Glass(part) => part.letters(),
             Self::Mixture(part) => part.letters(),
             Self::Kept(part) => part.letters(),
+            Self::Layered(part) => part.letters(),
         }
     }
 
@@ -148,6 +179,7 @@ impl Bsdf {
             Self::Glass(part) => part.draw(wo, u_lobe, u, transport)?,
             Self::Mixture(part) => part.draw(wo, u_lobe, u, transport)?,
             Self::Kept(part) => part.draw(wo, u_lobe, u, transport)?,
+            Self::Layered(part) => part.draw(wo, u_lobe, u, transport)?,
         };
         let kind = if let Some(delta) = delta {
             let Delta { value, probability, letter } = delta;
@@ -174,6 +206,7 @@ impl Bsdf {
             Self::Glass(part) => part.evaluate(wo, wi, transport),
             Self::Mixture(part) => part.evaluate(wo, wi, transport),
             Self::Kept(part) => part.evaluate(wo, wi, transport),
+            Self::Layered(part) => part.evaluate(wo, wi, transport),
         }
     }
 }
@@ -219,5 +252,14 @@ fn clamped(s: &SurfaceParameters) -> SurfaceParameters {
         ior: s.ior.max(0.0).min(f32::MAX),
         transmission: unit(s.transmission),
         walls: s.walls,
+        layers: s.layers.map(|layers| Layers {
+            coat: unit(layers.coat),
+            coat_roughness: unit(layers.coat_roughness),
+            coat_normal: layers.coat_normal,
+            sheen: Rgb::from_array(layers.sheen.to_array().map(unit)),
+            sheen_roughness: unit(layers.sheen_roughness),
+            through: unit(layers.through),
+            through_color: Rgb::from_array(layers.through_color.to_array().map(unit)),
+        }),
     }
 }

@@ -52,6 +52,8 @@ pub struct PartialAttributes {
     pub scene: String,
     /// The method's name.
     pub method: String,
+    /// How the method solved the scene before the first sample, as JSON, where it did.
+    pub solution: Option<String>,
 }
 
 /// What a picture's attributes say.
@@ -94,6 +96,9 @@ pub struct Layers {
     pub attributes: BTreeMap<String, String>,
 }
 
+/// Most bytes of a partial's `ovtigre.solution`.
+const SOLUTION_MAX: usize = 1 << 18;
+
 const CHANNELS: [&str; 3] = ["R", "G", "B"];
 
 /// `R`, `G`, `B` for the picture, `NAME.R` … for a layer.
@@ -127,8 +132,10 @@ pub fn write_partial(sum: &Sum, frame: Size, attributes: &PartialAttributes) -> 
     ];
     let planes: Vec<(String, &Plane)> =
         sum.planes.iter().enumerate().map(|(i, plane)| (plane_prefix(i), plane)).collect();
-    let texts = named.map(|(name, value)| (name, AttributeValue::Text(text(&value))));
-    encode(&planes, frame, region, texts.to_vec(), Encoding::UNCOMPRESSED, LayerAttributes::default())
+    let solution = attributes.solution.iter().map(|json| ("ovtigre.solution", json.clone()));
+    let texts = named.into_iter().chain(solution);
+    let texts = texts.map(|(name, value)| (name, AttributeValue::Text(text(&value)))).collect();
+    encode(&planes, frame, region, texts, Encoding::UNCOMPRESSED, LayerAttributes::default())
 }
 
 /// What [`write_partial`] wrote; refuses more than `pixels_max` pixels, values that are not
@@ -166,7 +173,11 @@ pub fn read_partial(bytes: &[u8], pixels_max: usize) -> Result<(Sum, PartialAttr
         job: find("ovtigre.job")?.clone(),
         scene: find("ovtigre.scene")?.clone(),
         method: find("ovtigre.method")?.clone(),
+        solution: layers.attributes.get("ovtigre.solution").cloned(),
     };
+    if attributes.solution.as_ref().is_some_and(|json| json.len() > SOLUTION_MAX) {
+        return Err(ExrError::Attribute("ovtigre.solution"));
+    }
     Ok((sum, attributes))
 }
 
@@ -347,7 +358,12 @@ mod tests {
     }
 
     fn attributes() -> PartialAttributes {
-        PartialAttributes { job: "j".to_owned(), scene: "s".to_owned(), method: "path".to_owned() }
+        PartialAttributes {
+            job: "j".to_owned(),
+            scene: "s".to_owned(),
+            method: "path".to_owned(),
+            solution: Some("{}".to_owned()),
+        }
     }
 
     #[test]

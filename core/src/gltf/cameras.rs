@@ -2,6 +2,7 @@
 
 use crate::gltf::document::{At, Document};
 use crate::gltf::error::{LoadError, Problems};
+use crate::gltf::nodes::Carries;
 use crate::gltf::stage::Stage;
 use crate::scene::camera::{Camera, Projection, Stand};
 use crate::scene::normalisation::Normalisation;
@@ -14,7 +15,8 @@ pub(crate) fn read(
     problems: &mut Problems,
 ) -> Result<Vec<Camera>, LoadError> {
     let mut cameras = Vec::new();
-    for (place, node) in stage.tree.nodes.iter().enumerate() {
+    let whole = stage.tree.nodes.iter().enumerate().filter(|(_, node)| node.carries != Carries::Mesh);
+    for (place, node) in whole {
         let Some(index) = node.at.index("camera", "cameras", document.count("cameras"))? else {
             continue;
         };

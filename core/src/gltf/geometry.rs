@@ -7,7 +7,7 @@ use crate::gltf::shapes::Morphs;
 use crate::gltf::skin::Influences;
 use crate::gltf::textures::UvSets;
 use crate::gltf::topology::Mode;
-use crate::gltf::{skin, tangents};
+use crate::gltf::{skin, tangents, variants};
 use crate::scene::bounds::Bounds;
 use crate::scene::mesh::Form;
 use glam::{Vec2, Vec3, Vec4};
@@ -95,7 +95,7 @@ pub(crate) fn read<'a>(
         Primitive { at, attributes, source, vertices: position.count, used: Vec::new(), targets };
     primitive.used = renumber(&mut triangles, position.count);
     let mut geometry = Geometry { triangles, ..Geometry::default() };
-    geometry.material = at.index("material", "materials", source.document.count("materials"))?;
+    geometry.material = variants::material(source, at)?;
     geometry.positions = primitive.positions(&position)?;
     geometry.normals = primitive.normals(problems)?;
     geometry.colours = primitive.colours()?;

@@ -2,7 +2,7 @@
 
 use crate::gltf::document::{At, Document};
 use crate::gltf::error::{LoadError, Problems};
-use crate::gltf::nodes::Node;
+use crate::gltf::nodes::{Carries, Node};
 use crate::gltf::stage::Stage;
 use crate::math::colour::Rgb;
 use crate::scene::normalisation::Normalisation;
@@ -24,7 +24,8 @@ pub(crate) fn read(
         None => Vec::new(),
     };
     let mut lights = Vec::new();
-    for (place, node) in stage.tree.nodes.iter().enumerate() {
+    let whole = stage.tree.nodes.iter().enumerate().filter(|(_, node)| node.carries != Carries::Mesh);
+    for (place, node) in whole {
         let Some(at) = node.at.extension(NAME)? else {
             continue;
         };

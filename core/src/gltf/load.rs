@@ -13,7 +13,10 @@ use crate::gltf::nodes::Tree;
 use crate::gltf::report::{Animated, Dropped, Report};
 use crate::gltf::shapes::{Materials, Shape};
 use crate::gltf::textures::TextureTable;
-use crate::gltf::{cameras, extensions, knots, lights, materials, nodes, pictures, shapes, survey};
+use crate::gltf::{
+    cameras, draco, extensions, instancing, knots, lights, materials, nodes, pictures, shapes, survey,
+    variants,
+};
 use crate::scene::data::SceneData;
 use crate::scene::material::{Coverage, Material, MaterialId};
 use crate::scene::texture::Texture;
@@ -34,12 +37,21 @@ pub struct Loaded {
 /// nothing but the bytes and the limits.
 /// The scene is as its animations have it at 0 s.
 pub fn load(bundle: &Bundle, limits: &Limits) -> Result<Loaded, LoadError> {
-    load_while(bundle, limits, [0.0; 2])
+    load_as(bundle, limits, &Choice::default())
 }
 
-/// Reads a scene as [`load`] does, as it moves while a shutter is open from the first to the second of `times`, in
-/// seconds. All animations of the file play together. Where both times are the same, nothing moves.
-pub fn load_while(bundle: &Bundle, limits: &Limits, times: [f64; 2]) -> Result<Loaded, LoadError> {
+/// What of a file is to be shown.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Choice<'a> {
+    /// Seconds at which the shutter opens and closes. Where both are the same, nothing moves.
+    pub times: [f64; 2],
+    /// Name of a variant of materials (`KHR_materials_variants`); `None` for the materials that the file has without.
+    pub variant: Option<&'a str>,
+}
+
+/// Reads a scene as [`load`] does, as it moves while the shutter is open. All animations of the file play together.
+pub fn load_as(bundle: &Bundle, limits: &Limits, choice: &Choice<'_>) -> Result<Loaded, LoadError> {
+    let times = choice.times;
     let parts = bundle.parts()?;
     let document = Document::parse(bundle.name(), &parts.json, limits)?;
     let mut problems = Problems::default();
@@ -48,11 +60,16 @@ pub fn load_while(bundle: &Bundle, limits: &Limits, times: [f64; 2]) -> Result<L
     }
     check_version(&document)?;
     extensions::check(&document, &mut problems)?;
-    let buffers = Buffers::read(bundle, &document, parts.binary, limits)?;
-    let source = Source { document: &document, buffers: &buffers, limits };
+    let mut buffers = Buffers::read(bundle, &document, parts.binary, limits)?;
+    let filled = draco::fill(&document, &buffers, limits, &mut problems)?;
+    buffers.fill(filled);
+    let variant = choice.variant.map(|name| variants::find(&document, name)).transpose()?;
+    let source = Source { document: &document, buffers: &buffers, limits, variant };
 
     let animation = animation::read(source, &mut problems)?;
-    let tree = nodes::read(&document, &animation, times, &mut problems)?;
+    let mut tree = nodes::read(&document, &animation, times, &mut problems)?;
+    instancing::expand(source, &mut tree)?;
+    let tree = tree;
     let (mut table, mut dropped) = (TextureTable::default(), Dropped::default());
     let (mut shapes, skins) = shapes::find(source, &tree, &animation, times)?;
     let read = shapes::read(source, &mut shapes, &skins, &mut table, &mut dropped, &mut problems)?;
@@ -81,7 +98,8 @@ pub fn load_while(bundle: &Bundle, limits: &Limits, times: [f64; 2]) -> Result<L
     for volume in scene.materials.iter_mut().filter_map(|m| m.volume.as_mut()) {
         volume.absorption = (volume.absorption.as_dvec3() * metres).as_vec3();
     }
-    let report = Report { animated, ..Report::of(&scene, meshes, instances, dropped) };
+    let variants = variants::names(&document)?;
+    let report = Report { variants, animated, ..Report::of(&scene, meshes, instances, dropped) };
     point_out_what_is_missing(&scene, &report, &mut problems);
     Ok(Loaded { scene, warnings: problems.finish(), report })
 }
@@ -174,9 +192,11 @@ fn point_out_what_is_missing(scene: &SceneData, report: &Report, problems: &mut 
     if scene.cameras.is_empty() {
         problems.add("", "there is no camera: the scene is framed");
     }
-    if report.emissive_triangles == 0 && scene.punctual.is_empty() {
+    let dark = scene.materials.iter().all(|m| m.unlit.is_some());
+    if !scene.is_lit() && (!dark || report.triangles == 0) {
+        let light = if report.emissive_triangles == 0 { "there is no light" } else { "only textures glow" };
         problems
-            .add("", "there is no light: the scene is lit by a default sky unless an environment is given");
+            .add("", format!("{light}: the scene is lit by a default sky unless an environment is given"));
     }
     let degenerate = report.dropped.degenerate_triangles;
     if degenerate > 0 {

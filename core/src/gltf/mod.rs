@@ -13,13 +13,17 @@ mod buffers;
 mod cameras;
 mod curve;
 mod document;
+mod draco;
 mod extensions;
 mod gather;
 mod geometry;
 mod glb;
+mod guard;
+mod instancing;
 mod knots;
 mod lights;
 mod materials;
+mod meshopt;
 mod nodes;
 mod pictures;
 mod probes;
@@ -33,6 +37,7 @@ mod tangents;
 mod textures;
 mod topology;
 mod uri;
+mod variants;
 
 #[cfg(test)]
 mod tests;

@@ -20,6 +20,17 @@ pub(crate) struct Node<'a> {
     local: DAffine3,
     /// Its place among the nodes that move while the shutter is open.
     mover: Option<usize>,
+    pub(crate) carries: Carries,
+}
+
+/// What of its object in the document a node stands for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Carries {
+    All,
+    /// Its mesh stands at places of its own.
+    AllButMesh,
+    /// A place of a parent's mesh.
+    Mesh,
 }
 
 /// The nodes of the scene, parents before children.
@@ -79,7 +90,16 @@ pub(crate) fn read<'a>(
         let place = tree.nodes.len();
         tree.movers.extend(moves.then_some(place));
         tree.places[index] = Some(place);
-        tree.nodes.push(Node { at: at.clone(), name: at.name(), index, world, parent, local, mover });
+        tree.nodes.push(Node {
+            at: at.clone(),
+            name: at.name(),
+            index,
+            world,
+            parent,
+            local,
+            mover,
+            carries: Carries::All,
+        });
         stack.extend(children.lists[index].iter().rev().map(|&child| (child, Some(place))));
     }
     Ok(tree)
@@ -91,7 +111,8 @@ impl Tree<'_> {
         let mut pose = Pose { instant, moved: Vec::with_capacity(self.movers.len()) };
         for &place in &self.movers {
             let node = &self.nodes[place];
-            let local = match animation.channels(node.index) {
+            let channels = animation.channels(node.index).filter(|_| node.carries != Carries::Mesh);
+            let local = match channels {
                 Some(channels) => local(&node.at, Some(channels), instant)?,
                 None => node.local,
             };
@@ -105,6 +126,33 @@ impl Tree<'_> {
             pose.moved.push(world);
         }
         Ok(pose)
+    }
+
+    /// Puts the mesh of a node at a place relative to it.
+    pub(crate) fn place_mesh(&mut self, parent: usize, local: DAffine3) -> Result<(), LoadError> {
+        let (node, place) = (&self.nodes[parent], self.nodes.len());
+        let world = node.world * local;
+        if !world.is_finite() {
+            return Err(node.at.error("the transform of one of its instances exceeds the range of numbers"));
+        }
+        let mover = node.mover.map(|_| self.movers.len());
+        self.movers.extend(mover.map(|_| place));
+        self.nodes.push(Node {
+            at: node.at.clone(),
+            name: node.name.clone(),
+            index: node.index,
+            world,
+            parent: Some(parent),
+            local,
+            mover,
+            carries: Carries::Mesh,
+        });
+        Ok(())
+    }
+
+    /// Takes the mesh of a node away from where the node is.
+    pub(crate) fn take_mesh(&mut self, place: usize) {
+        self.nodes[place].carries = Carries::AllButMesh;
     }
 
     /// Node to file in a pose.

@@ -28,6 +28,8 @@ pub struct Report {
     pub cameras: u64,
     /// Names of the cameras, in order.
     pub camera_names: Vec<String>,
+    /// Names of the variants of its materials.
+    pub variants: Vec<String>,
     /// What can move.
     pub animated: Animated,
     /// What was left out.
@@ -82,6 +84,7 @@ impl Report {
             punctual_lights: scene.punctual.len() as u64,
             cameras: scene.cameras.len() as u64,
             camera_names: scene.cameras.iter().map(|c| c.name.clone()).collect(),
+            variants: Vec::new(),
             animated: Animated::default(),
             dropped,
             bytes: geometry as u64 + pictures.iter().map(|p| p.bytes() as u64).sum::<u64>(),

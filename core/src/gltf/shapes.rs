@@ -6,12 +6,12 @@ use crate::gltf::curve::Side;
 use crate::gltf::document::At;
 use crate::gltf::error::{LoadError, Problems};
 use crate::gltf::geometry::{self, Geometry, Wanted};
-use crate::gltf::materials;
-use crate::gltf::nodes::Tree;
+use crate::gltf::nodes::{Carries, Tree};
 use crate::gltf::report::Dropped;
 use crate::gltf::skin::{self, Skin};
 use crate::gltf::textures::{TextureTable, UvSets};
 use crate::gltf::topology::Mode;
+use crate::gltf::{materials, variants};
 use crate::scene::bounds::Bounds;
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
@@ -58,7 +58,8 @@ pub(crate) fn find(
     let (mut shapes, mut skins): (Vec<Shape>, Skins) = (Vec::new(), Skins::new());
     let mut plain: BTreeMap<usize, usize> = BTreeMap::new();
     let mut places = 0_u64;
-    for (place, node) in tree.nodes.iter().enumerate() {
+    let meshes = tree.nodes.iter().enumerate().filter(|(_, node)| node.carries != Carries::AllButMesh);
+    for (place, node) in meshes {
         let Some(mesh) = node.at.index("mesh", "meshes", document.count("meshes"))? else {
             continue;
         };
@@ -142,7 +143,7 @@ pub(crate) fn read(
                 problems.add(&primitive.pointer, "points and lines have no surface and are left out");
                 continue;
             }
-            let index = primitive.index("material", "materials", source.document.count("materials"))?;
+            let index = variants::material(source, primitive)?;
             let material = match read.entry(index) {
                 Entry::Occupied(known) => known.into_mut(),
                 Entry::Vacant(new) => new.insert(materials::read(source.document, index, table, problems)?),
@@ -171,7 +172,8 @@ fn wanted(read: &materials::Read, shape: &Shape) -> Wanted {
         let list = slot.set as usize;
         sets.0[list] = read.sets.0[list];
     }
-    let normal_map = material.normal.map(|(slot, _)| slot.set as usize);
+    let coat = material.layers.as_ref().and_then(|layers| layers.coat_normal);
+    let normal_map = material.normal.or(coat).map(|(slot, _)| slot.set as usize);
     let influences = if shape.skin.is_some() { skin::Wanted::Yes } else { skin::Wanted::No };
     Wanted { sets, normal_map, influences, morphs: shape.morphs }
 }

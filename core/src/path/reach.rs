@@ -12,6 +12,8 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 /// Most examples of paths that are not made.
 const EXAMPLES_MAX: usize = 8;
+/// Longest words that are counted, in scatterings.
+const COUNTED_MAX: u32 = 8;
 /// Most beginnings of paths that are tried for examples.
 const TRIED_MAX: usize = 1 << 14;
 
@@ -60,6 +62,30 @@ pub struct Unreachable {
     pub why: String,
     /// Methods that make all of them.
     pub reached_by: Vec<Method>,
+    /// How many of the words that are asked for they are, by length: from no scattering to eight, or to the most that a path
+    /// may have. All words count alike here, however much light takes them.
+    #[serde(default)]
+    pub shares: Vec<Share>,
+}
+
+/// Words of one length from one kind of light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Share {
+    /// Letters between L and E.
+    pub scatterings: u32,
+    /// Words that the expression accepts, that the scene's surfaces can make, and that show more than the image of a point.
+    pub asked: u64,
+    /// Those of them that no technique of the method makes.
+    pub unreachable: u64,
+}
+
+impl Unreachable {
+    /// Words that are not made, of those asked for, over all lengths that are counted.
+    pub fn counts(&self) -> [u64; 2] {
+        self.shares
+            .iter()
+            .fold([0; 2], |[missing, asked], share| [missing + share.unreachable, asked + share.asked])
+    }
 }
 
 /// What of a path matters to techniques; its scatterings are met from the eye on.
@@ -176,14 +202,17 @@ impl<'l> Search<'l> {
     }
 
     /// Whether paths that end in `node` are asked for and seen, but not made.
-    fn is_missing(&self, (state, course): Node, method: Method) -> bool {
+    fn is_missing(&self, node: Node, method: Method) -> bool {
+        self.is_asked(node) && !node.1.is_made(method, self.light, self.eye)
+    }
+
+    /// Whether paths that end in `node` are asked for and seen.
+    fn is_asked(&self, (state, course): Node) -> bool {
         let asked = |tag: &LightTag| {
             let light = self.language.light_start(*tag);
             light.is_some_and(|light| !self.language.accepts(self.states[state], light).is_empty())
         };
-        course.is_seen(self.light, self.eye)
-            && !course.is_made(method, self.light, self.eye)
-            && self.tags.iter().any(asked)
+        course.is_seen(self.light, self.eye) && self.tags.iter().any(asked)
     }
 
     fn report(&self, method: Method, bounces: Option<u32>) -> Option<Unreachable> {
@@ -197,7 +226,32 @@ impl<'l> Search<'l> {
         let others = [Method::Path, Method::Light, Method::Bidirectional, Method::Photon];
         let reached_by = others.into_iter().filter(makes_all).collect();
         let paths = paths.iter().map(|word| text(word)).collect();
-        Some(Unreachable { light: self.light, paths, why: why.to_owned(), reached_by })
+        let shares = self.shares(method, bounces);
+        Some(Unreachable { light: self.light, paths, why: why.to_owned(), reached_by, shares })
+    }
+
+    /// Counts words by their length: the automaton is deterministic, so that each word is one way through the graph.
+    fn shares(&self, method: Method, bounces: Option<u32>) -> Vec<Share> {
+        let start = (self.language.eye_start().index(), Course::default());
+        let mut words = BTreeMap::from([(start, 1_u64)]);
+        let longest = bounces.map_or(COUNTED_MAX, |most| most.min(COUNTED_MAX));
+        let mut shares = Vec::new();
+        for scatterings in 0..=longest {
+            let count = |of: &dyn Fn(Node) -> bool| {
+                words.iter().filter(|(node, _)| of(**node)).map(|(_, n)| n).sum::<u64>()
+            };
+            let (asked, unreachable) =
+                (count(&|node| self.is_asked(node)), count(&|node| self.is_missing(node, method)));
+            shares.push(Share { scatterings, asked, unreachable });
+            let mut longer = BTreeMap::new();
+            for (node, n) in &words {
+                for (_, to) in &self.graph[node] {
+                    *longer.entry(*to).or_insert(0) += n;
+                }
+            }
+            words = longer;
+        }
+        shares
     }
 
     /// The shortest words that are missing, from the eye.
@@ -365,6 +419,14 @@ mod tests {
                     reports += 1;
                     let shortest: Vec<String> = missing.iter().take(8).map(|word| text(word)).collect();
                     assert_eq!(report.paths, shortest, "{what}");
+                    for Share { scatterings, asked: words, unreachable } in &report.shares {
+                        let count = |all: &mut dyn Iterator<Item = &Vec<Letter>>| {
+                            all.filter(|word| word.len() == *scatterings as usize).count() as u64
+                        };
+                        let counted = [count(&mut asked.iter()), count(&mut missing.iter().copied())];
+                        assert_eq!([*words, *unreachable], counted, "{what}, {scatterings} scatterings");
+                    }
+                    assert_eq!(report.counts(), [missing.len() as u64, asked.len() as u64], "{what}");
                     for other in METHODS {
                         let makes_all = missing.iter().all(|word| is_made(other, word, light, eye));
                         assert_eq!(report.reached_by.contains(&other), makes_all, "{what} or {other:?}");

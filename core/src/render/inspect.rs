@@ -11,7 +11,6 @@ use crate::gltf::report::Report;
 use crate::math::colour::Rgb;
 use crate::path::expression::language::LightTag;
 use crate::path::reach::{EyeKind, LightKind, Surroundings};
-use crate::render::prepare::is_lit;
 use crate::scene::camera::{Camera, Projection};
 use crate::scene::data::SceneData;
 use crate::scene::material::{Coverage, Material, RoughnessMap};
@@ -96,6 +95,9 @@ fn letters(material: &Material) -> Letters {
     let textured_metal = matches!(material.roughness_map, Some(RoughnessMap::MetallicRoughness(_)));
     let choices = |factor: f32, textured: bool| [factor, if textured { 0.0 } else { factor }];
     let mut letters = Letters::NONE;
+    if material.unlit.is_some() {
+        return letters;
+    }
     for metallic in choices(material.metallic, textured_metal) {
         for transmission in choices(material.transmission.factor, material.transmission.texture.is_some()) {
             for specular in choices(material.specular.factor, material.specular.texture.is_some()) {
@@ -108,8 +110,14 @@ fn letters(material: &Material) -> Letters {
                     ior: material.ior,
                     transmission,
                     walls: material.walls(),
+                    layers: None,
                 };
                 letters = letters.union(Bsdf::from_surface(&surface).letters());
+                if let Some(layers) = &material.layers {
+                    let layers = Some(layers.without_textures());
+                    letters =
+                        letters.union(Bsdf::from_surface(&SurfaceParameters { layers, ..surface }).letters());
+                }
             }
         }
     }
@@ -117,7 +125,7 @@ fn letters(material: &Material) -> Letters {
 }
 
 /// Each feature that a scene may need, and whether this one does.
-fn features(report: &Report, data: &SceneData) -> [(&'static str, bool); 14] {
+fn features(report: &Report, data: &SceneData) -> [(&'static str, bool); 15] {
     let any = |of: fn(&Material) -> bool| data.materials.iter().any(of);
     [
         ("triangles", data.meshes.iter().any(|m| !m.triangles.is_empty())),
@@ -129,8 +137,9 @@ fn features(report: &Report, data: &SceneData) -> [(&'static str, bool); 14] {
         ("transmission", any(|m| m.transmission.factor > 0.0)),
         ("volumes", any(|m| m.volume.is_some())),
         ("emissive surfaces", any(Material::emits)),
+        ("unlit surfaces", any(|m| m.unlit.is_some())),
         ("punctual lights", !data.punctual.is_empty()),
-        (DEFAULT_SKY, !is_lit(data)),
+        (DEFAULT_SKY, !data.is_lit()),
         ("animation", report.animated.nodes > 0),
         ("skins", report.animated.skins > 0),
         ("morph targets", report.animated.morphs > 0),

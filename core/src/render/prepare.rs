@@ -3,7 +3,7 @@
 use crate::gltf::bundle::Bundle;
 use crate::gltf::error::LoadError;
 use crate::gltf::limits::Limits;
-use crate::gltf::load::load_while;
+use crate::gltf::load::{Choice, load_as};
 use crate::method::radiosity::Reconstruction;
 use crate::radiosity::fineness::Fineness;
 use crate::radiosity::solution::{Solution, TooManyTriangles};
@@ -11,7 +11,6 @@ use crate::scene::Scene;
 use crate::scene::camera::Camera;
 use crate::scene::data::SceneData;
 use crate::scene::environment::{Environment, EnvironmentError};
-use crate::scene::material::Material;
 use crate::scene::view::{LensInScene, Views};
 use crate::settings::{CameraChoice, EnvironmentSource, Method, Settings};
 use crate::trace::build_error::BuildError;
@@ -54,6 +53,14 @@ pub struct Prepared {
     pub radiosity: Option<Arc<Solution>>,
 }
 
+impl Prepared {
+    /// How the scene was solved before the first sample, as JSON, where it was.
+    pub fn solution(&self) -> Option<String> {
+        let solution = self.radiosity.as_ref()?;
+        Some(serde_json::to_string(solution.report()).expect("a report is plain data"))
+    }
+}
+
 /// Makes a scene ready to be rendered: [`open`], and what the method needs beside.
 pub fn prepare(
     bytes: impl Into<Arc<[u8]>>,
@@ -79,7 +86,8 @@ pub fn open(
     settings: &Settings,
 ) -> Result<Scene, PrepareError> {
     let times = [settings.shutter.open, settings.shutter.close];
-    let loaded = load_while(&Bundle::open(bytes)?, &Limits::default(), times)?;
+    let choice = Choice { times, variant: settings.variant.as_deref() };
+    let loaded = load_as(&Bundle::open(bytes)?, &Limits::default(), &choice)?;
     let data = loaded.scene;
     let views = views(&data, settings)?;
     let given = match &settings.environment {
@@ -92,13 +100,8 @@ pub fn open(
             }
         }),
     };
-    let environment = given.or_else(|| (!is_lit(&data)).then(Environment::default_sky));
+    let environment = given.or_else(|| (!data.is_lit()).then(Environment::default_sky));
     Ok(Scene::new(data, environment, views)?)
-}
-
-/// Whether a scene has light of its own.
-pub fn is_lit(data: &SceneData) -> bool {
-    !data.punctual.is_empty() || data.materials.iter().any(Material::emits)
 }
 
 fn views(data: &SceneData, settings: &Settings) -> Result<Views, PrepareError> {

@@ -75,6 +75,12 @@ impl SceneData {
         }
     }
 
+    /// Whether it has light of its own. Textures that glow, and no more than white would, are taken for decoration: what has
+    /// no other light was made to be seen under a sky.
+    pub fn is_lit(&self) -> bool {
+        !self.punctual.is_empty() || self.materials.iter().any(|m| m.emits() && !m.only_glows())
+    }
+
     /// The material of a triangle of an instance.
     pub fn material(&self, instance: u32, triangle: u32) -> &Material {
         let mesh = &self.meshes[self.instances[instance as usize].mesh.index()];

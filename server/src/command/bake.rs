@@ -179,6 +179,7 @@ fn settings(environment: Option<EnvironmentSource>, rotation_degrees: f64) -> Se
     Settings {
         size: Size { width: 1, height: 1 },
         camera: CameraChoice::Framed,
+        variant: None,
         method: Method::Radiosity,
         paths: FULL.to_owned(),
         layers: Vec::new(),

@@ -99,6 +99,7 @@ fn show(contents: &Contents) {
         ("textures", format!("{}, {} pixels", report.textures, report.pixels)),
         ("lights", or_none(lights, "none: a default sky lights it")),
         ("cameras", or_none(cameras(contents), "none: the whole scene is framed")),
+        ("variants", variants(contents)),
         ("memory", words::bytes(report.bytes)),
         ("needs", words::list(&contents.needs)),
         ("leaves out", words::list(&contents.leaves_out)),
@@ -113,12 +114,19 @@ fn show(contents: &Contents) {
     }
 }
 
+fn variants(contents: &Contents) -> String {
+    words::list(&contents.report.variants.iter().map(|name| format!("'{name}'")).collect::<Vec<_>>())
+}
+
 fn cameras(contents: &Contents) -> String {
     let names = contents.report.camera_names.iter().enumerate();
     let shown: Vec<String> = names
-        .map(|(i, name)| match contents.aspects.get(i).copied().flatten() {
-            Some(aspect) => format!("{i} '{name}' ({aspect:.3}:1)"),
-            None => format!("{i} '{name}'"),
+        .map(|(i, name)| {
+            let called = if name.is_empty() { i.to_string() } else { format!("{i} '{name}'") };
+            match contents.aspects.get(i).copied().flatten() {
+                Some(aspect) => format!("{called} ({aspect:.3}:1)"),
+                None => called,
+            }
         })
         .collect();
     words::list(&shown)

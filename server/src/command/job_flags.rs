@@ -30,6 +30,9 @@ pub(crate) struct JobFlags {
     /// Camera, by its name or its number from 0 [default: the first; without one the scene is framed].
     #[arg(long, value_name = "NAME|INDEX")]
     pub(crate) camera: Option<String>,
+    /// Variant of the scene's materials, by its name [default: the materials that the scene has without].
+    #[arg(long, value_name = "NAME")]
+    pub(crate) variant: Option<String>,
     /// Samples a pixel at most [default: 256].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) samples: Option<u32>,
@@ -105,6 +108,7 @@ impl JobFlags {
             name: Some(name),
             size: self.size,
             camera: self.camera.clone(),
+            variant: self.variant.clone(),
             samples: self.samples,
             error: self.error,
             seconds: self.seconds,
@@ -207,7 +211,7 @@ mod tests {
     #[test]
     fn every_flag_arrives_in_the_request_and_survives_json() {
         let request = parse(
-            "--size 640x480 --camera 2 --samples 64 --error 0.01 --seconds 60 --paths LDE --method light
+            "--size 640x480 --camera 2 --variant red --samples 64 --error 0.01 --seconds 60 --paths LDE --method light
              --layer a=LE --layer b=LDE --strategies 0,3;1,2 --weights power --bounces 3 --lens-radius 0.01
              --focus-distance 2 --shutter -1,0.5 --shadows off --seed 7 --replicates 8 --region 1,2,3,4",
         )
@@ -218,6 +222,7 @@ mod tests {
             (Some(MethodRequest::Light), Some(WeightsRequest::Power))
         );
         assert_eq!((request.shutter, request.shadows), (Some([-1.0, 0.5]), Some(Shadows::Off)));
+        assert_eq!(request.variant.as_deref(), Some("red"));
         assert_eq!((request.layers.len(), request.region.map(|r| r.height)), (2, Some(4)));
         let text = serde_json::to_string(&request).unwrap();
         assert_eq!(serde_json::from_str::<JobRequest>(&text).unwrap(), request);

@@ -10,6 +10,7 @@ use std::{
     sync::Arc,
     time::Instant,
 };
+use tokio::sync::Notify;
 
 /// Batches of one job before its turn is over.
 const TURN: u64 = 4;
@@ -68,6 +69,7 @@ pub struct Offer {
 pub struct Book {
     jobs: BTreeMap<JobId, Entry>,
     leases: HashMap<LeaseId, Holding>,
+    more: Arc<Notify>,
 }
 
 impl Book {
@@ -75,6 +77,12 @@ impl Book {
     pub fn add(&mut self, id: JobId, mut entry: Entry) {
         entry.served = self.jobs.values().map(|e| e.served).min().unwrap_or(0);
         self.jobs.insert(id, entry);
+        self.more.notify_waiters();
+    }
+
+    /// Notified when there may be more to hand out than before.
+    pub fn more(&self) -> Arc<Notify> {
+        Arc::clone(&self.more)
     }
 
     /// A job that is over, and its leases.
@@ -92,6 +100,7 @@ impl Book {
     pub fn reach(&mut self, id: &JobId, checkpoints: u32) {
         if let Some(entry) = self.jobs.get_mut(id) {
             entry.plan.reach(checkpoints);
+            self.more.notify_waiters();
         }
     }
 
@@ -123,6 +132,7 @@ impl Book {
     pub fn put_back(&mut self, job: &JobId, batch: BatchKey) {
         if let Some(entry) = self.jobs.get_mut(job) {
             entry.plan.put_back(batch);
+            self.more.notify_waiters();
         }
     }
 

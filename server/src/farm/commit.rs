@@ -13,7 +13,10 @@ use crate::{
     store::row::{BatchKey, CommitOutcome, CommitRow, NewCommit},
 };
 use bytes::Bytes;
-use ovtigre_core::film::{batch::Batch, exr, sum::Sum};
+use ovtigre_core::{
+    film::{batch::Batch, exr, sum::Sum},
+    settings::Method,
+};
 use ovtigre_proto::{
     id::{BlobId, JobId, LeaseId, WorkerId},
     lease::Commit,
@@ -22,6 +25,13 @@ use std::time::Duration;
 
 /// Longest time that is believed of one batch.
 const TIME_MAX: Duration = Duration::from_hours(30 * 24);
+
+/// What a partial EXR says.
+struct Decoded {
+    sum: Sum,
+    hash: BlobId,
+    solution: Option<String>,
+}
 
 impl Farm {
     /// The partial EXR of a lease's batch, on which its worker spent `time`. The first sum of a
@@ -34,7 +44,10 @@ impl Farm {
             return Ok(Commit::NotNeeded);
         };
         let batch = live.batch(key).ok_or_else(|| FarmError::not_found("lease", lease))?;
-        let (sum, hash) = self.decode(&live, batch, partial.clone()).await?;
+        let Decoded { sum, hash, solution } = self.decode(&live, batch, partial.clone()).await?;
+        if let Some(json) = solution.filter(|_| live.spec.settings.method == Method::Radiosity) {
+            self.keep_solution(&job, &json).await?;
+        }
         let name = BlobName::Partial(job.clone(), key, hash.clone());
         self.blobs.put(&name, partial).await?;
         let worker = self.book().lease(lease).map(|held| held.row.worker.clone());
@@ -77,7 +90,7 @@ impl Farm {
         }
     }
 
-    async fn decode(&self, live: &Live, batch: Batch, partial: Bytes) -> Result<(Sum, BlobId)> {
+    async fn decode(&self, live: &Live, batch: Batch, partial: Bytes) -> Result<Decoded> {
         let _turn = self.decoders.acquire().await.map_err(|_| FarmError::Stopping)?;
         let (job, scene) = (live.id.clone(), live.scene.clone());
         let method = live.spec.settings.method.name();
@@ -101,7 +114,7 @@ impl Farm {
                 return Err(FarmError::Sum(format!("it has {} planes, not {planes}", sum.planes.len())));
             }
             let hash = BlobId::of(sum.hash());
-            Ok((sum, hash))
+            Ok(Decoded { sum, hash, solution: says.solution })
         })
         .await?
     }

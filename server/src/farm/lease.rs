@@ -13,7 +13,10 @@ use ovtigre_proto::{
     lease::{Exchange, ExchangeReply, FailureKind, Lease, LeaseFailure, WorkerJoin, WorkerJoined},
     status::WorkerState,
 };
-use std::time::Instant;
+use std::{
+    pin::pin,
+    time::{Duration, Instant},
+};
 
 /// Longest text that a worker says of itself.
 const TEXT_MAX: usize = 200;
@@ -45,18 +48,30 @@ impl Farm {
         Ok(WorkerJoined { id, interval_seconds: self.interval() })
     }
 
-    /// A worker's beat: renews what it holds, tells what to drop, hands out what it wants.
+    /// A worker's beat: renews what it holds, tells what to drop, hands out what it wants. A worker that
+    /// holds nothing is answered when there is something for it, or else at the time of its next beat.
     pub async fn exchange(&self, worker: &WorkerId, said: Exchange) -> Result<ExchangeReply> {
         let state = self.hear(worker, &said).await?;
         let drop = self.renew(worker, &said).await?;
-        let leases = match state {
-            WorkerState::Active if !said.leaving && !self.crew().rests(worker) => {
-                self.hand_out(worker, &said).await?
+        let more = self.book().more();
+        let mut more = pin!(more.notified());
+        more.as_mut().enable();
+        let mut interval = self.interval();
+        let mut leases = Vec::new();
+        if state == WorkerState::Active && !said.leaving && !self.crew().rests(worker) {
+            leases = self.hand_out(worker, &said).await?;
+            let idle = said.wants > 0 && said.holding.is_empty() && drop.is_empty();
+            if leases.is_empty() && idle {
+                tokio::select! {
+                    () = more => {}
+                    () = self.stopping.cancelled() => {}
+                    () = tokio::time::sleep(Duration::from_secs_f64(interval)) => interval = 0.0,
+                }
+                leases = self.hand_out(worker, &said).await?;
             }
-            _ => Vec::new(),
-        };
+        }
         let drain = state != WorkerState::Active;
-        Ok(ExchangeReply { leases, drop, interval_seconds: self.interval(), drain })
+        Ok(ExchangeReply { leases, drop, interval_seconds: interval, drain })
     }
 
     /// Seconds between beats: short while there are few workers.

@@ -19,6 +19,7 @@ pub mod reach;
 pub mod reap;
 pub mod rules;
 pub mod scene;
+pub mod solution;
 pub mod spec;
 pub mod split;
 pub mod status;

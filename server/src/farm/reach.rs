@@ -51,7 +51,7 @@ pub fn missing(
 
 /// One line of it for people.
 pub fn line(missing: &Unreachable) -> String {
-    let Unreachable { light, paths, why, reached_by } = missing;
+    let Unreachable { light, paths, why, reached_by, shares } = missing;
     let from = match light {
         LightKind::Surface => "emissive surfaces",
         LightKind::Environment => "the environment",
@@ -63,5 +63,14 @@ pub fn line(missing: &Unreachable) -> String {
         some => format!("method {} makes them", some.join(" or ")),
     };
     let shown: Vec<&str> = paths.iter().take(3).map(String::as_str).collect();
-    format!("paths such as {} from {from} are not in the picture: {why}; {instead}", shown.join(", "))
+    let share = match missing.counts() {
+        [_, 0] => String::new(),
+        [lost, asked] => {
+            let longest = shares.last().map_or(0, |share| share.scatterings);
+            let percent = 100.0 * lost as f64 / asked as f64;
+            format!(" ({percent:.2} % of the words of up to {longest} scatterings)")
+        }
+    };
+    let shown = shown.join(", ");
+    format!("paths such as {shown} from {from}{share} are not in the picture: {why}; {instead}")
 }

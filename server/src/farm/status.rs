@@ -60,6 +60,7 @@ impl Farm {
         let workers = if row.state.is_over() { 0 } else { self.store.workers_of(&row.id).await? };
         let eta_seconds = eta(row, &progress, &spec, &curve);
         let layers = self.layers_of(&row.id, &spec).await?;
+        let radiosity = self.solution_of(&row.id, spec.settings.method).await?;
         Ok(JobStatus {
             id: row.id.clone(),
             name: row.name.clone(),
@@ -88,6 +89,7 @@ impl Farm {
             method_reason: spec.method_reason,
             paths: shown(&spec.settings.paths).to_owned(),
             unreachable: spec.unreachable,
+            radiosity,
             layers,
             settings: spec.settings,
             region: spec.region,

@@ -112,6 +112,9 @@ pub fn resolve(
         note("/camera", detail);
         CameraChoice::Framed
     });
+    if let Some(detail) = request.variant.as_ref().and_then(|wanted| no_variant(wanted, scene)) {
+        note("/variant", detail);
+    }
     let size = request.size.unwrap_or_else(|| default_size(scene, camera));
     if size.width == 0 || size.height == 0 || size.width.max(size.height) > Size::SIDE_MAX {
         note("/size", format!("each side is 1 to {} pixels", Size::SIDE_MAX));
@@ -148,6 +151,7 @@ pub fn resolve(
         settings: Settings {
             size,
             camera,
+            variant: request.variant.clone(),
             method: chosen.method,
             paths: chosen.paths,
             layers: chosen.layers,
@@ -225,10 +229,23 @@ fn camera(request: &JobRequest, scene: &SceneContents) -> std::result::Result<Ca
             "the scene has no camera '{wanted}', and no other: leave 'camera' out to have it framed"
         )),
         None => {
-            let list: Vec<String> =
-                scene.cameras.iter().enumerate().map(|(n, name)| format!("{n} '{name}'")).collect();
+            let called = |(n, name): (usize, &String)| match name.as_str() {
+                "" => n.to_string(),
+                name => format!("{n} '{name}'"),
+            };
+            let list: Vec<String> = scene.cameras.iter().enumerate().map(called).collect();
             Err(format!("the scene has no camera '{wanted}'; it has {}", list.join(", ")))
         }
+    }
+}
+
+/// Why a scene has no variant of this name.
+fn no_variant(wanted: &String, scene: &SceneContents) -> Option<String> {
+    let list: Vec<String> = scene.variants.iter().map(|name| format!("'{name}'")).collect();
+    match &list[..] {
+        _ if scene.variants.contains(wanted) => None,
+        [] => Some(format!("the scene has no variant '{wanted}', and no other: leave 'variant' out")),
+        list => Some(format!("the scene has no variant '{wanted}'; it has {}", list.join(", "))),
     }
 }
 
@@ -295,7 +312,7 @@ fn warnings(
         ));
     }
     if lit == Lit::ByScene && scene.needs.iter().any(|need| need == DEFAULT_SKY) {
-        warnings.push("nothing in the scene emits light: it gets a default sky".to_owned());
+        warnings.push("the scene has no light of its own: it gets a default sky".to_owned());
     }
     warnings.extend(scene.warnings.iter().map(|w| {
         if w.pointer.is_empty() { w.detail.clone() } else { format!("{}: {}", w.pointer, w.detail) }

@@ -4,7 +4,7 @@ use super::builder::{Builder, TRIANGLE, U8};
 use crate::gltf::bundle::Bundle;
 use crate::gltf::error::LoadError;
 use crate::gltf::limits::Limits;
-use crate::gltf::load::{Loaded, load_while};
+use crate::gltf::load::{Choice, Loaded, load_as};
 use crate::scene::data::SceneData;
 use crate::scene::punctual::PunctualKind;
 use crate::trace::moment::Moment;
@@ -25,7 +25,7 @@ impl Builder {
     }
 
     fn try_load_while(&self, times: [f64; 2]) -> Result<Loaded, LoadError> {
-        load_while(&Bundle::open(self.glb())?, &Limits::default(), times)
+        load_as(&Bundle::open(self.glb())?, &Limits::default(), &Choice { times, ..Choice::default() })
     }
 
     fn scene_at(&self, time: f64) -> SceneData {
@@ -448,8 +448,9 @@ fn a_joint_that_is_not_there_is_named() {
 #[test]
 fn morph_targets_beyond_the_limit_are_named() {
     let limits = Limits { morphed_vertices: 2, ..Limits::default() };
-    let error =
-        load_while(&Bundle::open(morphing().glb()).unwrap(), &limits, [0.0; 2]).unwrap_err().to_string();
+    let error = load_as(&Bundle::open(morphing().glb()).unwrap(), &limits, &Choice::default())
+        .unwrap_err()
+        .to_string();
     assert!(error.contains("/meshes/0/primitives/0: 3 vertices of morph targets"), "{error}");
 }
 

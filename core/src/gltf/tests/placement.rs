@@ -241,3 +241,38 @@ fn errors_of_points_bound_what_moving_them_rounds() {
         }
     }
 }
+
+#[test]
+fn a_mesh_stands_where_its_node_is_instanced() {
+    let mut builder = Builder::triangle(&[], json!({}));
+    let quarter = std::f32::consts::FRAC_1_SQRT_2;
+    let translation = builder.floats("VEC3", &[0.0, 0.0, 0.0, 10.0, 0.0, 0.0, 0.0, 20.0, 0.0]);
+    let rotation =
+        builder.floats("VEC4", &[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, quarter, quarter, 0.0, 0.0, 0.0, 0.0]);
+    let scale = builder.floats("VEC3", &[1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 1.0, 3.0, 1.0]);
+    builder.push("cameras", json!({"type": "perspective", "perspective": {"yfov": 1.0, "znear": 0.1}}));
+    builder.json["nodes"][0] = json!({"mesh": 0, "camera": 0, "translation": [1.0, 0.0, 0.0],
+        "extensions": {"EXT_mesh_gpu_instancing": {"attributes":
+            {"TRANSLATION": translation, "ROTATION": rotation, "SCALE": scale}}}});
+    let loaded = builder.load();
+    assert_eq!((loaded.report.instances, loaded.report.triangles, loaded.report.cameras), (3, 1, 1));
+    let corners =
+        |i| loaded.scene.corners(i, 0, Moment::STILL).map(|p| loaded.scene.normalisation.restore(p));
+    for (i, expected) in [
+        [[1.0, 0.0], [2.0, 0.0], [1.0, 1.0]],
+        // A quarter turn, twice as large: x becomes y, y becomes −x.
+        [[11.0, 0.0], [11.0, 2.0], [9.0, 0.0]],
+        [[1.0, 20.0], [2.0, 20.0], [1.0, 23.0]],
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        for (corner, [x, y]) in corners(i as u32).into_iter().zip(expected) {
+            assert!((corner - DVec3::new(x, y, 0.0)).length() < 1e-5, "{i}: {corner}");
+        }
+    }
+    builder.json["accessors"][scale]["count"] = json!(2);
+    assert!(builder.refusal().contains("as many instances"));
+    builder.json["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"] = json!({});
+    assert!(builder.refusal().contains("how many instances"));
+}

@@ -60,14 +60,16 @@ impl<C: Carriage> Gather<'_, C>
 where
     C::Light: Send,
 {
-    /// Light of the photons within the radius: flux over the area of the disk, times f.
+    /// Light of the photons within the radius: flux over the area of the disk, times f. What `evaluate` says has a cosine in
+    /// it, which photons have by arriving: it is divided by that of their own surface, which says how many of them come.
+    /// Where normals are smooth, that of the vertex can be next to nothing for many.
     fn gather(&self, walk: &Walk<'_, EyeState, C::Eye>, vertex: &Vertex<'_>, tally: &mut Tally) {
         let rules = walk.rules;
         let squared_radius = self.map.radius() * self.map.radius();
         let density = 1.0 / (PI * squared_radius * rules.light_paths as f32);
         self.map.around(vertex.at.position, |photon, squared| {
             let scatterings = walk.scatterings + 1 + photon.scatterings;
-            let cos = vertex.cos(photon.from);
+            let cos = photon.from.dot(photon.ng).abs();
             if scatterings > rules.bounces || vertex.at.ng.dot(photon.ng) < ALIGNED || cos == 0.0 {
                 return;
             }

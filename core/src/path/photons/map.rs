@@ -2,31 +2,38 @@
 
 use crate::path::photons::photon::Photon;
 use glam::{IVec3, Vec3};
-use rayon::prelude::*;
 
-/// Photons sorted by the cell of a grid that they are in. Cells are two radii wide, so that a ball touches at most eight.
+/// Photons by the cell of a grid that they are in. Cells are two radii wide, so that a ball touches at most eight.
 #[derive(Debug)]
 pub struct PhotonMap<T> {
     photons: Vec<Photon<T>>,
+    /// Where photons are, and their numbers, bucket after bucket: what is too far away is not looked at.
+    places: Vec<(Vec3, u32)>,
     /// Where each bucket of cells begins; one more at the end.
     starts: Vec<u32>,
     radius: f32,
 }
 
-impl<T: Send> PhotonMap<T> {
+impl<T> PhotonMap<T> {
     /// For balls of `radius`. Photons of a bucket keep their order.
-    pub fn new(mut photons: Vec<Photon<T>>, radius: f32) -> Self {
+    pub fn new(photons: Vec<Photon<T>>, radius: f32) -> Self {
         let buckets = photons.len().next_power_of_two();
-        let bucket_of = |position| bucket(cell(position, radius), buckets);
-        photons.par_sort_by_key(|photon| bucket_of(photon.position));
+        let bucket_of = |photon: &Photon<T>| bucket(cell(photon.position, radius), buckets);
         let mut starts = vec![0_u32; buckets + 1];
         for photon in &photons {
-            starts[bucket_of(photon.position) + 1] += 1;
+            starts[bucket_of(photon) + 1] += 1;
         }
         for i in 0..buckets {
             starts[i + 1] += starts[i];
         }
-        Self { photons, starts, radius }
+        let mut next = starts.clone();
+        let mut places = vec![(Vec3::ZERO, 0); photons.len()];
+        for (number, photon) in (0..).zip(&photons) {
+            let place = &mut next[bucket_of(photon)];
+            places[*place as usize] = (photon.position, number);
+            *place += 1;
+        }
+        Self { photons, places, starts, radius }
     }
 
     /// Calls `visit` with each photon within the radius of a point, and its squared distance.
@@ -41,10 +48,12 @@ impl<T: Send> PhotonMap<T> {
                 continue;
             }
             seen[corner as usize] = bucket;
-            for photon in &self.photons[self.starts[bucket] as usize..self.starts[bucket + 1] as usize] {
-                let squared = (photon.position - point).length_squared();
+            for (position, number) in
+                &self.places[self.starts[bucket] as usize..self.starts[bucket + 1] as usize]
+            {
+                let squared = (position - point).length_squared();
                 if squared < self.radius * self.radius {
-                    visit(photon, squared);
+                    visit(&self.photons[*number as usize], squared);
                 }
             }
         }

@@ -210,6 +210,7 @@ pub(crate) fn partial(lease: &Lease, sum: &Sum) -> Bytes {
         job: lease.job.to_string(),
         scene: lease.scene.to_string(),
         method: lease.settings.method.name().to_owned(),
+        solution: None,
     };
     write_partial(sum, lease.settings.size, &attributes).into()
 }

@@ -36,6 +36,7 @@ async fn a_request_that_cannot_be_followed_is_refused_where_it_is_wrong() {
         ("/environment", Box::new(|r| r.environment = Some(EnvironmentRequest::Uniform([-1.0, 0.0, 0.0])))),
         ("/environment_rotation", Box::new(|r| r.environment_rotation = Some(90.0))),
         ("/camera", Box::new(|r| r.camera = Some("2".to_owned()))),
+        ("/variant", Box::new(|r| r.variant = Some("red".to_owned()))),
         ("/region", Box::new(|r| r.region = Some("1200,0,200,10".parse().unwrap()))),
         ("/samples", Box::new(|r| r.samples = Some(0))),
         ("/samples", Box::new(|r| r.samples = Some(u32::MAX))),
