@@ -84,6 +84,10 @@ impl Bsdf {
             return Self::layered(given, letters);
         }
         let s = clamped(given);
+        // Written where it is returned to: a copy of the whole costs as much as making it.
+        if letters.contains(Letters::NATURAL) && !letters.has(Letter::Mirrored) {
+            return Self::whole(&s);
+        }
         let whole = Self::whole(&s);
         let own = whole.letters();
         let twins = letters.has(Letter::Mirrored) && own.has(Letter::Glossy);

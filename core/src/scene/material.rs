@@ -1,6 +1,6 @@
 //! What surfaces are made of.
 
-use crate::bsdf::surface::{Layers, Walls};
+use crate::bsdf::surface::{Layers, SurfaceParameters, Walls};
 use crate::math::colour::Rgb;
 use crate::scene::texture::{Texture, TextureId};
 use glam::{Affine2, Vec2, Vec3, Vec4};
@@ -271,6 +271,11 @@ impl Material {
         self.emission.factor.max_element() > 0.0
     }
 
+    /// Whether all of its surface emits alike.
+    pub fn emits_evenly(&self) -> bool {
+        self.emission.texture.is_none() && self.coverage == Coverage::Opaque
+    }
+
     /// Whether it emits by a texture, and nowhere more than a radiance of one.
     pub fn only_glows(&self) -> bool {
         self.emission.texture.is_some() && self.emission.factor.max_element() <= 1.0
@@ -350,6 +355,33 @@ impl Material {
     pub fn transmitted(&self, textures: &[Texture], at: &SurfaceCoordinates) -> f32 {
         let texel = self.transmission.texture.map_or(1.0, |slot| slot.sample(textures, at).x);
         (self.transmission.factor * texel).clamp(0.0, 1.0)
+    }
+
+    /// What the surface is made of at a point, below its layers.
+    pub fn surface(&self, textures: &[Texture], at: &SurfaceCoordinates) -> SurfaceParameters {
+        let (roughness, metallic) = self.roughness_and_metallic(textures, at);
+        let (specular, specular_color) = self.dielectric(textures, at);
+        SurfaceParameters {
+            base_color: self.base(textures, at).truncate().clamp(Vec3::ZERO, Vec3::ONE),
+            metallic,
+            roughness,
+            specular,
+            specular_color,
+            ior: self.ior,
+            transmission: self.transmitted(textures, at),
+            walls: self.walls(),
+            layers: None,
+        }
+    }
+
+    /// What the surface is made of wherever the mesh has no colours; `None` where textures tell, and of layers.
+    pub fn even_surface(&self) -> Option<SurfaceParameters> {
+        let textures = [self.base_color.texture, self.specular.texture, self.specular_color.texture];
+        let even = textures.iter().all(Option::is_none)
+            && self.transmission.texture.is_none()
+            && self.roughness_map.is_none()
+            && self.layers.is_none();
+        even.then(|| self.surface(&[], &SurfaceCoordinates { uvs: [Vec2::ZERO; 2], colour: Vec4::ONE }))
     }
 
     /// The normal that the map says, in the frame of tangent, bitangent and normal; not of unit length.
