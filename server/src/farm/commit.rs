@@ -27,13 +27,6 @@ use std::{sync::Arc, time::Duration};
 /// Longest time that is believed of one batch.
 const TIME_MAX: Duration = Duration::from_hours(30 * 24);
 
-/// What a partial EXR says.
-struct Decoded {
-    sum: Sum,
-    hash: BlobId,
-    solution: Option<String>,
-}
-
 /// How a sum came.
 #[derive(Clone, Copy)]
 enum Way {
@@ -41,6 +34,13 @@ enum Way {
     Here,
     /// It is among the blobs.
     Handed,
+}
+
+/// What a partial EXR says.
+struct Decoded {
+    sum: Sum,
+    hash: BlobId,
+    solution: Option<String>,
 }
 
 impl Farm {

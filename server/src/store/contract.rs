@@ -301,12 +301,12 @@ async fn pauses_are_no_run_time(store: &dyn Store) {
     store.change_job(&job, 2, state(JobState::Paused)).await.unwrap();
     let paused = run().await;
     assert!(paused >= 0.035, "{paused}");
-    tokio::time::sleep(Duration::from_millis(200)).await;
+    tokio::time::sleep(Duration::from_millis(1000)).await;
     assert!((run().await - paused).abs() < 1e-9);
     store.change_job(&job, 3, state(JobState::Running)).await.unwrap();
     tokio::time::sleep(Duration::from_millis(20)).await;
     let resumed = run().await;
-    assert!(resumed >= paused + 0.015 && resumed < paused + 0.15, "{paused} {resumed}");
+    assert!(resumed >= paused + 0.015 && resumed < paused + 0.9, "{paused} {resumed}");
     store.change_job(&job, 4, state(JobState::Done)).await.unwrap();
     let ended = run().await;
     tokio::time::sleep(Duration::from_millis(20)).await;
@@ -320,12 +320,12 @@ async fn workers_are_seen_and_lost(store: &dyn Store) {
     let row = store.worker(&a).await.unwrap().unwrap();
     assert_eq!((row.join, row.state, row.leases), (join(), WorkerState::Active, 0));
     assert!(store.lose_workers(LONG).await.unwrap().is_empty());
-    tokio::time::sleep(Duration::from_millis(60)).await;
+    tokio::time::sleep(Duration::from_millis(1200)).await;
     let seen = async |id, state| store.see_worker(id, state).await.unwrap();
     assert_eq!(seen(&a, WorkerState::Active).await, Some(WorkerState::Active));
     assert_eq!(seen(&a, WorkerState::Draining).await, Some(WorkerState::Draining));
     assert_eq!(seen(&a, WorkerState::Active).await, Some(WorkerState::Draining), "it was told to leave");
-    assert_eq!(store.lose_workers(Duration::from_millis(40)).await.unwrap(), std::slice::from_ref(&b));
+    assert_eq!(store.lose_workers(Duration::from_secs(1)).await.unwrap(), std::slice::from_ref(&b));
     assert_eq!(seen(&id("none"), WorkerState::Active).await, None);
     assert!(store.set_worker_state(&a, WorkerState::Gone).await.unwrap());
     let page = store.workers(None, 1).await.unwrap();
@@ -363,14 +363,14 @@ async fn what_others_do_is_seen(store: &dyn Store) {
 async fn one_appends_to_a_job(store: &dyn Store) {
     let job = with_job(store, "a").await;
     let lane = Lane { replicate: 0, region: 0 };
-    let short = Duration::from_millis(40);
+    let short = Duration::from_millis(800);
     let take = async |holder, time| store.take_merge(&job, holder, time).await.unwrap();
     assert_eq!(store.take_merge(&id("none"), "x", LONG).await.unwrap(), None);
     let first = take("x", short).await.unwrap();
     assert_eq!(take("y", LONG).await, None, "x has it");
     assert_eq!(store.keep_merges("x", short).await.unwrap(), [(job.clone(), first)]);
     store.set_snapshot(&job, first, lane, 1).await.unwrap();
-    tokio::time::sleep(Duration::from_millis(60)).await;
+    tokio::time::sleep(Duration::from_millis(1000)).await;
     store.set_snapshot(&job, first, lane, 2).await.unwrap();
     let second = take("y", LONG).await.unwrap();
     assert_ne!(first, second);
