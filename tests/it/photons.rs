@@ -25,7 +25,6 @@ fn without_radius(Case { what, glb, settings }: &Case, passes: u32) -> Parts {
         let picture = rendered(glb, &settings, passes);
         assert_eq!(picture.invalid(), 0, "{what}: samples were dropped");
         let linear = |[wide, narrow]: [f64; 2]| wide + (narrow - wide) / (1.0 - 0.5_f64.sqrt());
-        eprintln!("{what} {side} {:?} {:?}", picture.mean(), picture.mean_of(1));
         Parts::combined([&picture.parts(0), &picture.parts(1)], linear)
     };
     Parts::combined([&at(SIDE), &at(SIDE / 2)], |[fine, coarse]| fine + (fine - coarse) / 3.0)
@@ -37,7 +36,6 @@ fn agree(case: &Case, samples: u32, passes: u32) {
     let settings = Settings { method: Method::Bidirectional, ..case.settings.clone() };
     let both = rendered(&case.glb, &settings, samples);
     let p = without_radius(case, passes);
-    eprintln!("{} {:?} {:?}", case.what, p.whole(), both.mean());
     both.parts(0).assert_same(&p, 0.003, &format!("{}: bidirectional and photons", case.what));
 }
 

@@ -8,22 +8,36 @@ use ovtigre_core::{
         size::Region,
         sum::Sum,
     },
-    render::{batch::render, progress::Progress},
+    radiosity::{fineness::Fineness, solution::Solution},
+    render::{
+        batch::render,
+        prepare::{Prepared, open},
+        progress::Progress,
+    },
     settings::{Layer, Lens, Method, Settings, Shows, Strategy},
 };
 use ovtigre_tests::{
     glb::Glb,
     picture::{in_environment, rendered, scene, settings},
     scenes::{cuboid, floor, glass, lambert, sphere},
+    textures::png,
 };
-use serde_json::json;
+use serde_json::{Value, json};
+use std::sync::Arc;
 
 /// A small scene with a bit of everything, all lengths times `scale`, then moved by `offset` along each axis.
 fn everything(scale: f64, offset: f64) -> Vec<u8> {
+    everything_of(scale, offset, |_, material| material)
+}
+
+/// The same with its materials changed.
+fn everything_of(scale: f64, offset: f64, change: impl Fn(&mut Glb, Value) -> Value) -> Vec<u8> {
     let mut glb = Glb::new();
-    let mut add = |material: serde_json::Value, (positions, triangles): (Vec<Vec3>, Vec<[u32; 3]>)| {
+    let mut add = |material: Value, (positions, triangles): (Vec<Vec3>, Vec<[u32; 3]>)| {
+        let material = change(&mut glb, material);
         let material = glb.material(material);
-        let mesh = glb.mesh(&positions, &triangles, material);
+        let uvs = vec![0.5; 2 * positions.len()];
+        let mesh = glb.mesh_with(&positions, &triangles, material, &[("TEXCOORD_0", &uvs, 2)]);
         glb.place(mesh);
     };
     add(lambert(0.6, 0.0), floor(-1.0, 10.0, 0.0, 0.0));
@@ -41,9 +55,20 @@ fn everything(scale: f64, offset: f64) -> Vec<u8> {
     glb.finish_under(json!({"scale": [scale, scale, scale], "translation": [offset, offset, offset]}))
 }
 
+/// A scene ready to be rendered; radiosity by fewer patches and rays than a picture's.
+fn solved(glb: &[u8], settings: &Settings) -> Prepared {
+    if settings.method != Method::Radiosity {
+        return scene(glb, settings);
+    }
+    let scene = open(glb, None, settings).unwrap();
+    let fineness = Fineness { even: 256, most: 512, refinements: 1, rays: 32 };
+    let solution = Solution::new(&scene, settings.shadows, None, fineness).unwrap();
+    Prepared { scene, radiosity: Some(Arc::new(solution)) }
+}
+
 fn sum(glb: &[u8], settings: &Settings, batch: Batch, threads: usize) -> Sum {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-    pool.install(|| render(&scene(glb, settings), settings, batch, &Progress::new()).unwrap())
+    pool.install(|| render(&solved(glb, settings), settings, batch, &Progress::new()).unwrap())
 }
 
 #[test]
@@ -83,6 +108,26 @@ fn methods() -> Vec<(String, Settings)> {
     both.chain([("Radiosity".to_owned(), radiosity)]).collect()
 }
 
+/// What is alike all over a surface is found once for all of its points, and what lights have in common once for all next
+/// events. A white texture is no reason for other bits.
+#[test]
+fn white_textures_change_no_bit() {
+    let white = |glb: &mut Glb, mut material: Value| {
+        let texture = json!({"index": glb.texture(&png(1, &[[255; 4]]), json!({}))});
+        for name in ["baseColorTexture", "metallicRoughnessTexture"] {
+            material["pbrMetallicRoughness"][name] = texture.clone();
+        }
+        material["emissiveTexture"] = texture;
+        material
+    };
+    let (plain, textured) = (everything(1.0, 0.0), everything_of(1.0, 0.0, white));
+    for (name, settings) in methods() {
+        let block = Block { index: 0, start: 0, count: 4 };
+        let batch = Batch { region: settings.size.frame(), replicate: 0, block };
+        assert!(sum(&plain, &settings, batch, 1) == sum(&textured, &settings, batch, 1), "{name}");
+    }
+}
+
 #[test]
 fn every_method_gives_the_same_bits_on_any_number_of_threads() {
     let glb = everything(1.0, 0.0);
@@ -104,7 +149,7 @@ fn every_method_gives_the_same_bits_on_any_number_of_threads() {
 fn blocks_of_every_method_add_up_to_the_same_sum() {
     let glb = everything(1.0, 0.0);
     for (what, settings) in methods() {
-        let scene = scene(&glb, &settings);
+        let scene = solved(&glb, &settings);
         let cut = |counts: &[u32]| {
             let mut sums =
                 vec![vec![[0.0_f64; 3]; settings.size.frame().pixels()]; settings.planes() as usize];

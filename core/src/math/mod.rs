@@ -2,6 +2,7 @@
 
 pub mod choice;
 pub mod colour;
+pub mod cosine;
 pub mod frame;
 pub mod quantile;
 pub mod robust;

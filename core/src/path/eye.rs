@@ -1,6 +1,7 @@
 //! The walk from the eye.
 
 use crate::bsdf::event::Transport;
+use crate::math::cosine::cosine;
 use crate::path::connect::hit::{hit_environment, hit_surface};
 use crate::path::connect::join::join;
 use crate::path::connect::light_vertex::LightVertex;
@@ -73,7 +74,7 @@ pub fn from_eye<'a, C: Carriage>(
         _ => 0.0,
     };
     let carried = C::Eye::in_state(rules.language.eye_start(), Vec3::ONE);
-    let cos = f64::from(view.axis().dot(ray.direction).abs());
+    let cos = cosine(view.axis(), ray.direction);
     let density = Density::SolidAngle(pdf as f32);
     let edge = Edge { ray, from: ray.origin, cos, density, kind };
     let partial = Partial { near, far: 0.0 };

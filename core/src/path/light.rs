@@ -2,6 +2,7 @@
 
 use crate::bsdf::event::Transport;
 use crate::math::colour::Rgb;
+use crate::math::cosine::{cosine, squared_distance};
 use crate::path::connect::lens::{Shown, hit_lens, light_to_lens, to_lens};
 use crate::path::connect::light_vertex::{LightStart, LightVertex};
 use crate::path::connect::unblocked;
@@ -15,7 +16,7 @@ use crate::path::vertex::{Density, Vertex};
 use crate::path::walk::{Edge, EdgeKind, Visitor, Walk};
 use crate::sampler::{Dimension, Sampler, StartUse};
 use crate::scene::Scene;
-use crate::scene::emission::{Origin, Place};
+use crate::scene::emission::{Emission, Origin, Place};
 use crate::scene::interaction::Interaction;
 use crate::trace::moment::Moment;
 use crate::trace::ray::Ray;
@@ -27,7 +28,7 @@ pub struct FromLight<'a, C: Carriage> {
     /// Vertices that eye subpaths can be joined to, where they are kept.
     pub vertices: Vec<LightVertex<'a, C::Light>>,
     keeps: Keeps,
-    start: LightStart,
+    pub(in crate::path) start: LightStart,
     origin: Origin<'a>,
 }
 
@@ -113,11 +114,26 @@ pub fn from_light<'a, C: Carriage>(
     let Some(emission) = origin.place.emit(&scene.data, choice.y, pair(StartUse::Direction)) else {
         return Vec::new();
     };
+    let (walk, mut visitor) =
+        set_out::<C>((scene, rules), (sampler, moment), origin, &emission, state, keeps);
+    walk.run(&mut visitor, tally);
+    visitor.vertices
+}
+
+/// The walk along the first edge that light takes from `origin`, and what follows it.
+pub(in crate::path) fn set_out<'a, C: Carriage>(
+    (scene, rules): (&'a Scene, &'a Rules),
+    (sampler, moment): (&'a Sampler, Moment),
+    origin: Origin<'a>,
+    emission: &Emission,
+    state: LightState,
+    keeps: Keeps,
+) -> (Walk<'a, LightState, C::Light>, FromLight<'a, C>) {
     let is_hit = matches!(origin.place, Place::Surface(_) | Place::Sky(..));
     let kind = if origin.place.is_distant() { EdgeKind::Parallel } else { EdgeKind::Directions };
     let (place, direction) = (f64::from(origin.pdf), f64::from(emission.pdf));
     let h = rules.heuristic();
-    let cos = f64::from(emission.cos);
+    let cos = emission.cos;
     let near = h.of(1.0 / direction);
     let far = if is_hit { h.of(cos / (place * direction)) } else { 0.0 };
     let throughput = emission.radiance * (cos / (place * direction)) as f32;
@@ -134,9 +150,7 @@ pub fn from_light<'a, C: Carriage>(
         walk.links.push(Link { forward: place, reverse: 0.0, jacobian: 0.0, specular: false });
     }
     let start = LightStart { next_event: place, is_hit };
-    let mut visitor = FromLight::<C> { vertices: Vec::new(), keeps, start, origin };
-    walk.run(&mut visitor, tally);
-    visitor.vertices
+    (walk, FromLight { vertices: Vec::new(), keeps, start, origin })
 }
 
 /// Joins the place that light starts from to the lens itself.
@@ -155,8 +169,8 @@ fn show<C: Carriage>(
             let radiance = at.emission(at.side(seen.direction)) * at.alpha();
             let start = at.leave(seen.direction);
             let ray = Ray { origin: start, direction: seen.end - start, t_max: 1.0, moment };
-            let squared = f64::from((seen.end - at.position).length_squared());
-            (seen, radiance, ray, squared, f64::from(seen.direction.dot(at.ng).abs()))
+            let squared = squared_distance(seen.end, at.position);
+            (seen, radiance, ray, squared, cosine(seen.direction, at.ng))
         }
         Place::Sky(towards, radiance) => {
             let Some(seen) = view.see_far(*towards, lens) else { return };
@@ -173,15 +187,9 @@ fn show<C: Carriage>(
         let radiance: Rgb = radiance / origin.pdf;
         let environment = scene.environment.as_ref();
         let towards = -seen.direction;
-        let emission = scene.lights.emission_density(
-            &scene.data,
-            environment,
-            moment,
-            origin.light,
-            towards,
-            cos as f32,
-        );
-        let cos_lens = f64::from(view.axis().dot(towards).abs());
+        let emission =
+            scene.lights.emission_density(&scene.data, environment, moment, origin.light, towards, cos);
+        let cos_lens = cosine(view.axis(), towards);
         let onto_lens = f64::from(emission.emission) * cos_lens / squared;
         let lens = view.lens_pdf();
         let shown = Shown { seen, radiance, place, squared, cos, onto_lens, lens, passes, state };

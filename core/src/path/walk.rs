@@ -2,6 +2,7 @@
 
 use crate::bsdf::event::Transport;
 use crate::math::colour::Rgb;
+use crate::math::cosine::{cosine, squared_distance};
 use crate::path::connect::light_vertex::LightStart;
 use crate::path::media::Media;
 use crate::path::mis::exhaustive::{Ends, Link};
@@ -10,7 +11,7 @@ use crate::path::rules::{Rules, Weighing};
 use crate::path::tally::Tally;
 use crate::path::throughput::{State, Throughput};
 use crate::path::vertex::{Continuation, Crossing, Density, Vertex};
-use crate::sampler::{Dimension, Sampler, Use};
+use crate::sampler::{Dimension, Sampler, ScatteringNumbers, Use};
 use crate::scene::Scene;
 use crate::scene::interaction::Interaction;
 use crate::scene::view::View;
@@ -37,6 +38,8 @@ pub struct Walk<'a, S: State, T: Throughput<S>> {
     pub rules: &'a Rules,
     /// Its numbers.
     pub sampler: &'a Sampler,
+    /// Its numbers at the vertex that it is at.
+    pub numbers: ScatteringNumbers,
     /// Where it goes.
     pub edge: Edge,
     /// What a unit of light (from the eye) or of importance (from a light) at its end counts at its start.
@@ -135,6 +138,7 @@ impl<'a, S: State, T: Throughput<S>> Walk<'a, S, T> {
             scene,
             rules,
             sampler,
+            numbers: ScatteringNumbers::default(),
             edge,
             carried,
             partial,
@@ -171,7 +175,8 @@ impl<'a, S: State, T: Throughput<S>> Walk<'a, S, T> {
             if self.scatterings >= self.rules.bounces || !visitor.goes_on(&self) {
                 return;
             }
-            let Some(vertex) = Vertex::new(at, -self.edge.ray.direction, self.rules.letters) else { return };
+            let Some(vertex) = Vertex::new(at, -self.edge.ray.direction, self.rules) else { return };
+            self.numbers = self.sampler.scattering(|what| self.dimension(what));
             visitor.scatters(&self, &vertex, tally);
             if !self.scatter(&vertex, visitor) {
                 return;
@@ -215,16 +220,17 @@ impl<'a, S: State, T: Throughput<S>> Walk<'a, S, T> {
     /// Squared length of the edge up to `position`, or one where its density is over places.
     pub fn squared(&self, position: Vec3) -> f64 {
         match self.edge.kind {
-            EdgeKind::Directions => f64::from((position - self.edge.from).length_squared()),
+            EdgeKind::Directions => squared_distance(position, self.edge.from),
             EdgeKind::Parallel => 1.0,
         }
     }
 
-    fn arrive(&mut self, at: &Interaction<'_>) {
+    /// Reaches a surface.
+    pub(in crate::path) fn arrive(&mut self, at: &Interaction<'_>) {
         let back = -self.edge.ray.direction;
         let distance = (at.position - self.edge.ray.origin).length();
         self.carried.scale(self.media.transmittance_to(distance, at, back));
-        let (squared, cos) = (self.squared(at.position), f64::from(back.dot(at.ng).abs()));
+        let (squared, cos) = (self.squared(at.position), cosine(back, at.ng));
         self.partial.arrive(self.rules.heuristic(), squared, cos);
         if self.keeps_links() {
             let forward = self.edge.density.over_solid_angle() * cos / squared;
@@ -236,33 +242,37 @@ impl<'a, S: State, T: Throughput<S>> Walk<'a, S, T> {
     /// Goes on from `vertex`; false where the walk ends. Roulette survives with min(1, throughput without the
     /// factors of refraction): never capped, since a cap below 1 has infinite variance where albedos are near one.
     fn scatter<V: Visitor<'a, S, T>>(&mut self, vertex: &Vertex<'_>, _: &V) -> bool {
-        let choice = self.sampler.pair(self.dimension(Use::Choice));
-        let u = self.sampler.pair(self.dimension(Use::Direction));
+        let (choice, u) = (self.numbers.choice(), self.numbers.direction());
         let Some(next) = vertex.sample(choice.x, u, self.transport) else { return false };
-        let Continuation { direction, weight, density, eta, crossing } = next;
-        self.carried = self.carried.scattered(&self.rules.language, weight);
+        self.carried = self.carried.scattered(&self.rules.language, next.weight);
         if self.carried.is_dead() {
             return false;
         }
         self.eta_squared *= match self.transport {
-            Transport::Radiance => eta * eta,
+            Transport::Radiance => next.eta * next.eta,
             Transport::Importance => 1.0,
         };
         self.scatterings += 1;
-        if density != Density::Delta {
+        if next.density != Density::Delta {
             self.sight = Sight::Scattered;
         }
         if self.scatterings >= ROULETTE_FROM && !self.survives(choice.y) {
             return false;
         }
-        let cos = f64::from(vertex.cos(direction));
+        self.follow::<V>(vertex, &next);
+        true
+    }
+
+    /// Takes the edge that a continuation leads to.
+    pub(in crate::path) fn follow<V: Visitor<'a, S, T>>(&mut self, vertex: &Vertex<'_>, next: &Continuation) {
+        let Continuation { direction, density, crossing, .. } = *next;
+        let cos = vertex.cos(direction);
         self.look_back::<V>(vertex, direction, density, cos);
         if crossing == Crossing::Crosses {
             self.media.cross(&vertex.at, direction);
         }
         let ray = vertex.ray(direction);
         self.edge = Edge { ray, from: vertex.at.position, cos, density, kind: EdgeKind::Directions };
-        true
     }
 
     fn survives(&mut self, u: f32) -> bool {

@@ -71,7 +71,7 @@ fn follow(scene: &Scene, patches: &Patches, sampler: &Sampler, most: u32, landed
     let Some(origin) = origin else { return };
     let Some(emission) = origin.place.emit(&scene.data, choice.y, pair(StartUse::Direction)) else { return };
     let density = f64::from(origin.pdf) * f64::from(emission.pdf);
-    let mut flux: Rgb = emission.radiance * (f64::from(emission.cos) / density) as f32;
+    let mut flux: Rgb = emission.radiance * (emission.cos / density) as f32;
     let mut ray = emission.ray;
     for n in 0..most {
         landed.rays += 1;

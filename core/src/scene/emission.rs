@@ -4,9 +4,10 @@ use crate::math::colour::Rgb;
 use crate::math::frame::Frame;
 use crate::math::warp;
 use crate::scene::data::SceneData;
+use crate::scene::emitter::mesh_order;
 use crate::scene::environment::Environment;
 use crate::scene::interaction::{Interaction, Side};
-use crate::scene::light::{Light, area, mesh_order};
+use crate::scene::light::Light;
 use crate::scene::lights::Lights;
 use crate::scene::material::Sides;
 use crate::scene::punctual::PunctualKind;
@@ -51,7 +52,7 @@ pub struct Emission {
     /// place over the area of a disk that the scene's sphere shows (light from infinitely far).
     pub pdf: f32,
     /// |cos θ| at the surface; one for other lights.
-    pub cos: f32,
+    pub cos: f64,
 }
 
 impl Lights {
@@ -69,7 +70,7 @@ impl Lights {
             Light::Triangle { instance, triangle } => {
                 let barycentric = mesh_order(data, instance, warp::triangle(u));
                 let at = data.emitter(instance, triangle, barycentric, moment);
-                (1.0 / area(data.corners(instance, triangle, moment)), Place::Surface(at))
+                (1.0 / self.emitter(data, light, moment).area(), Place::Surface(at))
             }
             Light::Punctual(index) => match data.punctual[index as usize].at(moment) {
                 kind @ (PunctualKind::Point { position, .. } | PunctualKind::Spot { position, .. }) => {
@@ -108,12 +109,12 @@ impl Lights {
         moment: Moment,
         light: u32,
         towards: Vec3,
-        cos: f32,
+        cos: f64,
     ) -> EmissionDensity {
         let (origin, emission) = match *self.light(light) {
             Light::Triangle { instance, triangle } => {
                 let sides = data.material(instance, triangle).sides;
-                (1.0 / area(data.corners(instance, triangle, moment)), surface_direction_pdf(sides, cos))
+                (1.0 / self.emitter(data, light, moment).area(), surface_direction_pdf(sides, cos))
             }
             Light::Punctual(index) => match &data.punctual[index as usize].kind {
                 PunctualKind::Directional { .. } => (1.0, disk_pdf(data)),
@@ -146,10 +147,10 @@ impl Place<'_> {
 }
 
 /// Density of [`Place::emit`] over solid angle for a direction at the given cosine to a surface's normal.
-fn surface_direction_pdf(sides: Sides, cos: f32) -> f32 {
+fn surface_direction_pdf(sides: Sides, cos: f64) -> f32 {
     match sides {
-        Sides::Front => warp::cosine_hemisphere_pdf(cos),
-        Sides::Both => 0.5 * cos.abs() * FRAC_1_PI,
+        Sides::Front => warp::cosine_hemisphere_pdf(cos as f32),
+        Sides::Both => 0.5 * cos as f32 * FRAC_1_PI,
     }
 }
 
@@ -172,7 +173,8 @@ fn from_surface(at: &Interaction<'_>, lobe: f32, u: Vec2) -> Emission {
     let normal = if side == Side::Back { -at.ng } else { at.ng };
     let local = warp::cosine_hemisphere(u);
     let direction = Frame::around(normal).to_world(local).normalize();
-    let cos = direction.dot(normal);
+    // Not below: a direction that rounding turned to the other side carries nothing.
+    let cos = direction.as_dvec3().dot(normal.as_dvec3());
     Emission {
         ray: Ray::new(at.leave(direction), direction),
         radiance: at.emission(side) * at.alpha(),

@@ -1,4 +1,4 @@
-//! Renders the pictures of docs/LIGHT.md: `cargo run --release -p ovtigre-tests --bin make-light-pictures`.
+//! Renders the pictures of docs/LIGHT.md: `cargo run --release -p ovtigre-tests --bin make-light-pictures [NAME…]`.
 
 use anyhow::Context as _;
 use ovtigre_core::{
@@ -16,15 +16,24 @@ use ovtigre_tests::{
     scenes::cornell,
     showcase::caustic,
 };
-use std::{fs, path::PathBuf, time::Instant};
+use std::{fs, path::PathBuf};
 
 /// Pixels between pictures of a sheet.
 const GAP: u32 = 4;
 
 fn main() -> anyhow::Result<()> {
-    write("presets", &presets(), 0.0)?;
-    write("pyramid", &pyramid(), 0.0)?;
-    write("caustic", &caustics(), -1.0)
+    let asked: Vec<String> = std::env::args().skip(1).collect();
+    let is_asked = |name: &str| asked.is_empty() || asked.iter().any(|one| one == name);
+    if is_asked("presets") {
+        write("presets", &presets(), 0.0)?;
+    }
+    if is_asked("pyramid") {
+        write("pyramid", &pyramid(), 0.0)?;
+    }
+    if is_asked("caustic") {
+        write("caustic", &caustics()?, -1.0)?;
+    }
+    Ok(())
 }
 
 /// The lecture's presets of the bundled room, left to right.
@@ -54,18 +63,33 @@ fn pyramid() -> Sheet {
     sheet
 }
 
-/// A caustic by path, light, bidirectional and photon, each for the same time.
-fn caustics() -> Sheet {
+/// Seconds of CPU that each picture of the caustic takes.
+const CAUSTIC_SECONDS: f64 = 6.0;
+
+/// A caustic by path, light, bidirectional and photon, each for the same time of the processor, whatever else it does. Says how
+/// long they took.
+fn caustics() -> anyhow::Result<Sheet> {
     let mut sheet = Sheet::new(4, [192, 144]);
     for (i, method) in [Method::Path, Method::Light, Method::Bidirectional, Method::Photon].iter().enumerate()
     {
         let settings = Settings { method: *method, ..settings(192, 144, 1) };
-        let start = Instant::now();
-        rendered(&caustic(), &settings, 4);
-        let samples = (4.0 * 8.0 / start.elapsed().as_secs_f64()).max(1.0) as u32;
+        let start = cpu_seconds()?;
+        rendered(&caustic(), &settings, 8);
+        let begun = cpu_seconds()?;
+        let samples = (8.0 * CAUSTIC_SECONDS / (begun - start)).max(1.0) as u32;
         sheet.place(i as u32, 0, &rendered(&caustic(), &settings, samples).picture().planes[0]);
+        eprintln!("{}: {samples} samples in {:.2} s of CPU", method.name(), cpu_seconds()? - begun);
     }
-    sheet
+    Ok(sheet)
+}
+
+/// Seconds that all threads of this process have run for.
+fn cpu_seconds() -> anyhow::Result<f64> {
+    const TICKS: f64 = 100.0;
+    let stat = fs::read_to_string("/proc/self/stat").context("no account of CPU time: this needs Linux")?;
+    let after_name = stat.rsplit(')').next().unwrap_or_default();
+    let fields = after_name.split_whitespace().skip(11).take(2).map(str::parse::<f64>);
+    Ok(fields.collect::<Result<Vec<_>, _>>()?.iter().sum::<f64>() / TICKS)
 }
 
 /// Pictures of one size side by side.

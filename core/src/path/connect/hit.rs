@@ -1,6 +1,7 @@
 //! Light that an eye subpath hits: no vertex of the path is from the light.
 
 use crate::math::colour::Rgb;
+use crate::math::cosine::cosine;
 use crate::path::connect::light_vertex::LightStart;
 use crate::path::connect::whole::{Joint, whole};
 use crate::path::expression::language::{EyeState, LightState};
@@ -17,15 +18,15 @@ use crate::settings::Shadows;
 use glam::Vec3;
 
 /// Light that was hit.
-struct Hit {
-    light: u32,
-    radiance: Rgb,
+pub(in crate::path) struct Hit {
+    pub(in crate::path) light: u32,
+    pub(in crate::path) radiance: Rgb,
     /// Density of a next event from the vertex before, in the measure of the eye's density.
-    next_event: f64,
-    emission: EmissionDensity,
+    pub(in crate::path) next_event: f64,
+    pub(in crate::path) emission: EmissionDensity,
     /// Turns a density over solid angle at the light into one over area at the vertex before; for light from infinitely
     /// far, one over its disk.
-    jacobian: f64,
+    pub(in crate::path) jacobian: f64,
 }
 
 /// Light of the environment where the ray leaves the scene.
@@ -75,14 +76,14 @@ pub fn hit_surface<S: Throughput<EyeState>, L: Throughput<LightState>>(
     if radiance == Vec3::ZERO {
         return;
     }
-    let cos = direction.dot(at.ng).abs();
+    let cos = cosine(direction, at.ng);
     let squared = walk.squared(at.position);
     let emission = scene.lights.emission_density(&scene.data, None, at.moment, light, direction, cos);
     let next_event = if walk.scatterings == 0 {
         f64::from(emission.origin)
     } else {
         let pdf = scene.lights.triangle_pdf(&scene.data, triangle, walk.edge.from, at, direction);
-        f64::from(pdf) * f64::from(cos) / squared
+        f64::from(pdf) * cos / squared
     };
     let jacobian = walk.edge.cos / squared;
     deposit::<S, L>(walk, &Hit { light, radiance, next_event, emission, jacobian }, tally);
@@ -125,7 +126,7 @@ fn deposit<S: Throughput<EyeState>, L: Throughput<LightState>>(
     tally.deposit(rules, Receiver::Own, technique, &walk.carried, &light, Rgb::splat(weight as f32));
 }
 
-fn weight<S: Throughput<EyeState>>(walk: &Walk<'_, EyeState, S>, hit: &Hit) -> f64 {
+pub(in crate::path) fn weight<S: Throughput<EyeState>>(walk: &Walk<'_, EyeState, S>, hit: &Hit) -> f64 {
     match &walk.rules.weighing {
         // Next events that nothing blocks have found all of it.
         Weighing::FromEye if walk.rules.shadows == Shadows::Off && walk.edge.density != Density::Delta => {

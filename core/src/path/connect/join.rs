@@ -1,6 +1,7 @@
 //! A vertex of an eye subpath joined to one of a light subpath.
 
 use crate::bsdf::event::Transport;
+use crate::math::cosine::squared_distance;
 use crate::path::connect::light_vertex::LightVertex;
 use crate::path::connect::unblocked;
 use crate::path::connect::whole::{Joint, whole};
@@ -14,12 +15,12 @@ use crate::path::walk::Walk;
 use glam::Vec3;
 
 /// The edge between two vertices.
-struct Between {
+pub(in crate::path) struct Between {
     /// From the eye's vertex to the light's.
-    direction: Vec3,
-    squared: f64,
+    pub(in crate::path) direction: Vec3,
+    pub(in crate::path) squared: f64,
     /// Densities over solid angle of going over it, from the eye's vertex and from the light's.
-    pdfs: [f32; 2],
+    pub(in crate::path) pdfs: [f32; 2],
 }
 
 /// Adds light that goes from `light` to `vertex` and on to the eye.
@@ -52,7 +53,7 @@ pub fn join<S: Throughput<EyeState>, L: Throughput<LightState>>(
     if passes == Vec3::ZERO {
         return;
     }
-    let squared = f64::from(towards.length_squared());
+    let squared = squared_distance(light.vertex.at.position, vertex.at.position);
     let between = Between { direction, squared, pdfs: [forward, backward] };
     let weight = weight(walk, vertex, light, &between);
     // Cosines are in the values.
@@ -60,7 +61,7 @@ pub fn join<S: Throughput<EyeState>, L: Throughput<LightState>>(
     tally.deposit(rules, Receiver::Own, technique, &eye, &from_light, factor);
 }
 
-fn weight<S: Throughput<EyeState>, L>(
+pub(in crate::path) fn weight<S: Throughput<EyeState>, L>(
     walk: &Walk<'_, EyeState, S>,
     vertex: &Vertex<'_>,
     light: &LightVertex<'_, L>,
@@ -69,9 +70,9 @@ fn weight<S: Throughput<EyeState>, L>(
     let Between { direction, squared, pdfs } = *between;
     let [forward, backward] = pdfs.map(f64::from);
     let bridge = Bridge {
-        onto_light: forward * f64::from(light.vertex.cos(direction)) / squared,
+        onto_light: forward * light.vertex.cos(direction) / squared,
         light_reverse: f64::from(light.vertex.reverse_pdf(-direction)),
-        onto_eye: backward * f64::from(vertex.cos(direction)) / squared,
+        onto_eye: backward * vertex.cos(direction) / squared,
         eye_reverse: f64::from(vertex.reverse_pdf(direction)),
     };
     match &walk.rules.weighing {

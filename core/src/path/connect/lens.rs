@@ -2,6 +2,7 @@
 
 use crate::bsdf::event::Transport;
 use crate::math::colour::Rgb;
+use crate::math::cosine::{cosine, squared_distance};
 use crate::path::connect::light_vertex::LightStart;
 use crate::path::connect::unblocked;
 use crate::path::connect::whole::{Joint, whole};
@@ -40,7 +41,7 @@ pub fn to_lens<E: Throughput<EyeState>, L: Throughput<LightState>>(
     if passes == Vec3::ZERO {
         return;
     }
-    let squared = f64::from((seen.end - vertex.at.position).length_squared());
+    let squared = squared_distance(seen.end, vertex.at.position);
     // The cosine at the vertex is in `value`.
     let importance = seen.pdf.over_area(squared, 1.0);
     let end = LensEnd::new(walk, vertex, &seen, squared, backward);
@@ -51,7 +52,7 @@ pub fn to_lens<E: Throughput<EyeState>, L: Throughput<LightState>>(
 }
 
 /// Densities of an edge to the lens.
-struct LensEnd {
+pub(in crate::path) struct LensEnd {
     /// With which a pixel's ray meets the vertex, over area.
     from_eye: f64,
     /// With which light from the vertex meets the lens, over area.
@@ -59,22 +60,22 @@ struct LensEnd {
 }
 
 impl LensEnd {
-    fn new<L: Throughput<LightState>>(
+    pub(in crate::path) fn new<L: Throughput<LightState>>(
         walk: &Walk<'_, LightState, L>,
         vertex: &Vertex<'_>,
         seen: &Seen,
         squared: f64,
         pdf: f32,
     ) -> Self {
-        let cos = f64::from(walk.view().axis().dot(seen.direction).abs());
+        let cos = cosine(walk.view().axis(), seen.direction);
         Self {
-            from_eye: seen.pdf.over_area(squared, f64::from(vertex.cos(seen.direction))),
+            from_eye: seen.pdf.over_area(squared, vertex.cos(seen.direction)),
             from_light: f64::from(pdf) * cos / squared,
         }
     }
 }
 
-fn weight<L: Throughput<LightState>>(
+pub(in crate::path) fn weight<L: Throughput<LightState>>(
     walk: &Walk<'_, LightState, L>,
     end: &LensEnd,
     start: LightStart,

@@ -13,7 +13,6 @@ use crate::path::tally::{Receiver, Tally};
 use crate::path::throughput::Throughput;
 use crate::path::vertex::{Vertex, Weight};
 use crate::path::walk::Walk;
-use crate::sampler::Use;
 use crate::scene::emission::EmissionDensity;
 use crate::scene::light::{FoundBy, NextEvent, ShadowEnd};
 use crate::settings::Shadows;
@@ -30,8 +29,7 @@ pub fn next_event<S: Throughput<EyeState>, L: Throughput<LightState>>(
         return;
     }
     let (scene, rules) = (walk.scene, walk.rules);
-    let choice = walk.sampler.pair(walk.dimension(Use::Light)).x;
-    let place = walk.sampler.pair(walk.dimension(Use::LightPoint));
+    let (choice, place) = (walk.numbers.light(), walk.numbers.light_point());
     let (point, moment) = (vertex.at.position, vertex.at.moment);
     let sampled = scene.lights.sample(&scene.data, scene.environment.as_ref(), moment, point, choice, place);
     let Some((light, event)) = sampled else { return };
@@ -80,7 +78,7 @@ fn unshadowed<S: Throughput<EyeState>>(
     unblocked::faded(vertex, &walk.media, event.direction, distance)
 }
 
-fn weight<S: Throughput<EyeState>>(
+pub(in crate::path) fn weight<S: Throughput<EyeState>>(
     walk: &Walk<'_, EyeState, S>,
     vertex: &Vertex<'_>,
     light: u32,
@@ -148,12 +146,9 @@ impl Around {
             event.direction,
             event.cos,
         );
-        let cos = f64::from(vertex.cos(event.direction));
-        let squared = match event.end {
-            ShadowEnd::Point(end) => f64::from((end - vertex.at.position).length_squared()),
-            ShadowEnd::Infinity => 1.0,
-        };
-        let to_light = f64::from(event.cos) / squared;
+        let cos = vertex.cos(event.direction);
+        let squared = event.squared;
+        let to_light = event.cos / squared;
         let next_event = match event.found_by {
             FoundBy::Both => f64::from(event.pdf) * to_light,
             FoundBy::NextEvent => f64::from(event.pdf),

@@ -6,4 +6,6 @@ pub mod partial;
 pub mod recursive;
 
 #[cfg(test)]
+mod in_scenes;
+#[cfg(test)]
 mod tests;

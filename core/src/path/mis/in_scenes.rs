@@ -1,0 +1,642 @@
+//! Random paths in random scenes: what the walks and joints say of every technique, against all densities written out from
+//! positions, BSDFs, lights and the camera.
+//!
+//! A path is given by its vertices. Unit directions between them are in f32, as everywhere; all else is computed in f64.
+
+use crate::bsdf::Bsdf;
+use crate::bsdf::event::{Scattered, Transport};
+use crate::film::size::Size;
+use crate::gltf::bundle::Bundle;
+use crate::gltf::limits::Limits;
+use crate::gltf::load::load;
+use crate::path::connect::hit::{self, Hit};
+use crate::path::connect::join::{self, Between};
+use crate::path::connect::lens::{self, LensEnd};
+use crate::path::connect::light_vertex::{LightStart, LightVertex};
+use crate::path::connect::next_event;
+use crate::path::expression::language::{EyeState, LightState};
+use crate::path::eye::{FromEye, from_eye};
+use crate::path::light::{FromLight, Keeps, set_out};
+use crate::path::mis::heuristic::Heuristic;
+use crate::path::rules::Rules;
+use crate::path::tally::Tally;
+use crate::path::throughput::{Carriage, Everything};
+use crate::path::vertex::{Continuation, Density, Vertex, Weight};
+use crate::path::walk::{Visitor, Walk};
+use crate::sampler::{Dimension, Sampler, Use};
+use crate::scene::Scene;
+use crate::scene::emission::{Emission, EmissionDensity, Origin, Place};
+use crate::scene::environment::Environment;
+use crate::scene::importance::{Importance, Seen};
+use crate::scene::interaction::Interaction;
+use crate::scene::light::{FoundBy, Light, NextEvent, ShadowEnd};
+use crate::scene::material::Sides;
+use crate::scene::punctual::PunctualKind;
+use crate::scene::view::{LensInScene, Views};
+use crate::settings::{CameraChoice, FULL, Gloss, Method, Settings, Shadows, Shutter, Weights};
+use crate::trace::moment::Moment;
+use crate::trace::ray::Ray;
+use base64::Engine;
+use core::f64::consts::PI;
+use glam::{DVec3, Vec2, Vec3};
+use serde_json::{Value, json};
+
+const NOW: Moment = Moment::STILL;
+
+struct Numbers {
+    sampler: Sampler,
+    next: u32,
+}
+
+impl Numbers {
+    fn pair(&mut self) -> Vec2 {
+        self.next += 1;
+        self.sampler.pair(Dimension::Eye(self.next, Use::Choice))
+    }
+
+    fn one(&mut self) -> f32 {
+        self.pair().x
+    }
+
+    fn of<T: Clone>(&mut self, all: &[T]) -> T {
+        all[(self.one() * all.len() as f32) as usize].clone()
+    }
+}
+
+/// A document in the making: bodies of loose triangles.
+struct Document {
+    json: Value,
+}
+
+impl Document {
+    fn push(&mut self, list: &str, value: Value) -> usize {
+        let list = self.json[list].as_array_mut().unwrap();
+        list.push(value);
+        list.len() - 1
+    }
+
+    fn body(&mut self, material: &Value, triangles: &[[Vec3; 3]]) {
+        let bytes: Vec<u8> =
+            triangles.iter().flatten().flat_map(|p| p.to_array()).flat_map(f32::to_le_bytes).collect();
+        let data = base64::engine::general_purpose::STANDARD.encode(&bytes);
+        let uri = format!("data:application/octet-stream;base64,{data}");
+        let buffer = self.push("buffers", json!({"byteLength": bytes.len(), "uri": uri}));
+        let view = self.push("bufferViews", json!({"buffer": buffer, "byteLength": bytes.len()}));
+        let low = triangles.iter().flatten().copied().reduce(Vec3::min).unwrap().to_array();
+        let high = triangles.iter().flatten().copied().reduce(Vec3::max).unwrap().to_array();
+        let accessor = self.push(
+            "accessors",
+            json!({"bufferView": view, "componentType": 5126, "type": "VEC3", "count": 3 * triangles.len(),
+                "min": low, "max": high}),
+        );
+        let material = self.push("materials", material.clone());
+        let primitive = json!({"attributes": {"POSITION": accessor}, "material": material});
+        let mesh = self.push("meshes", json!({"primitives": [primitive]}));
+        self.node(json!({"mesh": mesh}));
+    }
+
+    fn node(&mut self, node: Value) {
+        let node = self.push("nodes", node);
+        self.json["scenes"][0]["nodes"].as_array_mut().unwrap().push(json!(node));
+    }
+
+    fn light(&mut self, light: Value, mut node: Value) {
+        let lights = self.json["extensions"]["KHR_lights_punctual"]["lights"].as_array_mut().unwrap();
+        lights.push(light);
+        node["extensions"] = json!({"KHR_lights_punctual": {"light": lights.len() - 1}});
+        self.node(node);
+    }
+}
+
+/// The six sides of a box, their front outside.
+fn sides(low: Vec3, high: Vec3) -> [[[Vec3; 3]; 2]; 6] {
+    let corner = |i: usize| {
+        let pick = |axis: usize| if i >> axis & 1 == 0 { low[axis] } else { high[axis] };
+        Vec3::new(pick(0), pick(1), pick(2))
+    };
+    let faces = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    faces.map(|face| {
+        let [a, b, c, d] = face.map(corner);
+        [[a, b, c], [a, c, d]]
+    })
+}
+
+/// Smooth glass, rough glass, mirrors, metal down to α = 10⁻³, plastic with and without an ideally smooth coat, matt.
+fn materials() -> Vec<Value> {
+    let of = |metallic: f32, roughness: f32| {
+        json!({"pbrMetallicRoughness": {"baseColorFactor": [0.8, 0.7, 0.6, 1.0],
+            "metallicFactor": metallic, "roughnessFactor": roughness}})
+    };
+    let glass = |roughness: f32| {
+        let mut glass = of(0.0, roughness);
+        glass["extensions"] = json!({"KHR_materials_transmission": {"transmissionFactor": 0.9},
+            "KHR_materials_volume": {"thicknessFactor": 1.0}});
+        glass
+    };
+    let mut matt = of(0.0, 1.0);
+    matt["extensions"] = json!({"KHR_materials_specular": {"specularFactor": 0.0}});
+    vec![of(1.0, 0.0), of(1.0, 0.032), of(1.0, 0.3), of(0.0, 0.0), of(0.0, 0.3), glass(0.0), glass(0.4), matt]
+}
+
+/// α = 10⁻³, a little above what is taken for ideal.
+const NARROW: usize = 1;
+const MATT: usize = 7;
+
+/// What a scene is made of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Kind {
+    /// Any materials and lights.
+    Any,
+    /// A closed room whose floor and ceiling are narrow and matt: long paths.
+    Tunnel,
+}
+
+fn scene(kind: Kind, numbers: &mut Numbers) -> Scene {
+    let mut document = Document {
+        json: json!({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": []}], "nodes": [],
+            "meshes": [], "materials": [], "accessors": [], "bufferViews": [], "buffers": [], "cameras": [],
+            "extensionsUsed": ["KHR_lights_punctual"],
+            "extensions": {"KHR_lights_punctual": {"lights": []}}}),
+    };
+    let all = materials();
+    let closed = kind == Kind::Tunnel || numbers.one() < 0.5;
+    for (i, side) in sides(Vec3::splat(-1.0), Vec3::ONE).into_iter().enumerate() {
+        let inward = side.map(|[a, b, c]| [a, c, b]);
+        if !closed && i == 5 {
+            continue;
+        }
+        let material = match kind {
+            Kind::Any => numbers.of(&all),
+            Kind::Tunnel => all[if i % 2 == 0 { NARROW } else { MATT }].clone(),
+        };
+        document.body(&material, &inward);
+    }
+    for x in [-0.5, 0.4] {
+        let low = Vec3::new(x - 0.2, -0.9 + numbers.one(), -0.3);
+        document.body(&numbers.of(&all), sides(low, low + Vec3::new(0.45, 0.5, 0.6)).as_flattened());
+    }
+    lights(&mut document, numbers);
+    let camera = if numbers.one() < 0.7 {
+        json!({"type": "perspective", "perspective": {"yfov": 0.9, "znear": 0.01}})
+    } else {
+        json!({"type": "orthographic", "orthographic": {"xmag": 0.8, "ymag": 0.8, "znear": 0.0, "zfar": 9.0}})
+    };
+    document.push("cameras", camera);
+    document.node(json!({"camera": 0, "translation": [0.1, 0.0, 0.85]}));
+    let text = serde_json::to_vec(&document.json).unwrap();
+    let data = load(&Bundle::open(text).unwrap(), &Limits::default()).unwrap().scene;
+    let lens = (numbers.one() < 0.5).then(|| LensInScene {
+        radius: data.normalisation.distance(0.05) as f32,
+        focus_distance: data.normalisation.distance(1.5) as f32,
+    });
+    let views = Views::new(&data.cameras[0], SIZE, lens);
+    let environment = (numbers.one() < 0.4).then(|| Environment::uniform(Vec3::ONE));
+    Scene::new(data, environment, views).unwrap()
+}
+
+/// Some lights of every kind.
+fn lights(document: &mut Document, numbers: &mut Numbers) {
+    let mut lamp = materials()[MATT].clone();
+    lamp["emissiveFactor"] = json!([1.0, 1.0, 1.0]);
+    lamp["doubleSided"] = json!(numbers.one() < 0.5);
+    let [side, ..] = sides(Vec3::new(-0.1, 0.7, -0.3), Vec3::new(0.2, 0.9, 0.1));
+    document.body(&lamp, &side);
+    let half = core::f64::consts::FRAC_1_SQRT_2;
+    let down = json!({"translation": [0.2, 0.6, 0.1], "rotation": [-half, 0.0, 0.0, half]});
+    let cone = json!({"innerConeAngle": 0.3, "outerConeAngle": 1.2});
+    for light in [
+        json!({"type": "point", "intensity": 0.3}),
+        json!({"type": "spot", "intensity": 0.5, "spot": cone}),
+        json!({"type": "directional", "intensity": 0.5}),
+    ] {
+        if numbers.one() < 0.6 {
+            document.light(light, down.clone());
+        }
+    }
+}
+
+const SIZE: Size = Size { width: 8, height: 8 };
+
+fn settings(weights: Weights) -> Settings {
+    Settings {
+        size: SIZE,
+        camera: CameraChoice::Index(0),
+        variant: None,
+        method: Method::Bidirectional,
+        paths: FULL.to_owned(),
+        layers: Vec::new(),
+        gloss: Gloss::AsItIs,
+        strategies: Vec::new(),
+        weights,
+        bounces: None,
+        lens: None,
+        shutter: Shutter::default(),
+        environment: None,
+        shadows: Shadows::On,
+        seed: 0,
+        replicates: 1,
+    }
+}
+
+/// A vertex between light and lens.
+#[derive(Clone, Copy)]
+struct Point<'a> {
+    at: Interaction<'a>,
+    specular: bool,
+    /// Unit directions to the light's side and to the eye's.
+    to: [Vec3; 2],
+}
+
+/// A path from a light to the lens.
+struct Path<'a> {
+    scene: &'a Scene,
+    origin: Origin<'a>,
+    density: EmissionDensity,
+    /// From the light on.
+    vertices: Vec<Point<'a>>,
+    seen: Seen,
+}
+
+/// Surfaces that a walk from the eye meets, from the eye on, and whether it goes through them by a Dirac delta: `most` and
+/// on to one that is not ideally specular.
+fn surfaces<'a>(
+    scene: &'a Scene,
+    rules: &Rules,
+    most: usize,
+    numbers: &mut Numbers,
+) -> Option<(Vec<(Interaction<'a>, bool)>, Vec2)> {
+    let lens = numbers.pair();
+    let mut ray = scene.view(NOW).ray(numbers.pair() * 8.0, lens).at(NOW);
+    let mut all = Vec::new();
+    loop {
+        let hit = scene.closest(&ray, || 0)?;
+        let at = scene.data.interaction(hit.instance, hit.triangle, hit.barycentric, NOW);
+        let vertex = Vertex::new(at, -ray.direction, rules.letters)?;
+        let next = vertex.sample(numbers.one(), numbers.pair(), Transport::Radiance)?;
+        if all.len() + 1 >= most && vertex.is_smooth() {
+            all.push((at, false));
+            return Some((all, lens));
+        }
+        if all.len() > most + 40 {
+            return None;
+        }
+        all.push((at, next.density == Density::Delta));
+        ray = vertex.ray(next.direction);
+    }
+}
+
+fn path<'a>(scene: &'a Scene, rules: &Rules, most: usize, numbers: &mut Numbers) -> Option<Path<'a>> {
+    let (mut surfaces, lens) = surfaces(scene, rules, most, numbers)?;
+    surfaces.reverse();
+    let environment = scene.environment.as_ref();
+    let origin = scene.lights.origin(&scene.data, environment, NOW, numbers.one(), numbers.pair())?;
+    let first = surfaces[0].0.position;
+    let to_light = match &origin.place {
+        Place::Surface(at) => (at.position - first).try_normalize()?,
+        Place::Point(_, position) => (position - first).try_normalize()?,
+        Place::Sky(towards, _) | Place::Sun(towards, _) => *towards,
+    };
+    let cos = match &origin.place {
+        Place::Surface(at) => {
+            let lit = at.emission(at.side(-to_light)) != Vec3::ZERO;
+            lit.then(|| cosine(to_light, at.ng)).filter(|cos| *cos > 1e-3)?
+        }
+        Place::Point(PunctualKind::Spot { direction, inner_cos, outer_cos, .. }, _) => {
+            (PunctualKind::cone(*inner_cos, *outer_cos, -direction.dot(to_light)) > 0.0).then_some(1.0)?
+        }
+        _ => 1.0,
+    };
+    let density = scene.lights.emission_density(&scene.data, environment, NOW, origin.light, to_light, cos);
+    let seen = scene.view(NOW).see(surfaces.last()?.0.position, lens)?;
+    let mut vertices: Vec<Point<'a>> = Vec::new();
+    for (i, (at, specular)) in surfaces.iter().enumerate() {
+        let light = match i.checked_sub(1) {
+            Some(before) => (surfaces[before].0.position - at.position).try_normalize()?,
+            None => to_light,
+        };
+        let eye = match surfaces.get(i + 1) {
+            Some((next, _)) => -(at.position - next.position).try_normalize()?,
+            None => seen.direction,
+        };
+        vertices.push(Point { at: *at, specular: *specular, to: [light, eye] });
+    }
+    let origin = Origin { pdf: density.origin, ..origin };
+    let path = Path { scene, origin, density, vertices, seen };
+    path.vertices.iter().all(|v| v.specular || path_goes(v, rules)).then_some(path)
+}
+
+/// Whether a vertex scatters this way at all, seen from both sides.
+fn path_goes(v: &Point<'_>, rules: &Rules) -> bool {
+    v.to.into_iter().zip([v.to[1], v.to[0]]).all(|(back, direction)| {
+        Vertex::new(v.at, back, rules.letters)
+            .is_some_and(|vertex| vertex.evaluate(direction, Transport::Radiance).1 > 0.0)
+    })
+}
+
+fn cosine(a: Vec3, b: Vec3) -> f64 {
+    a.as_dvec3().dot(b.as_dvec3()).abs()
+}
+
+fn squared(a: Vec3, b: Vec3) -> f64 {
+    let off: DVec3 = a.as_dvec3() - b.as_dvec3();
+    off.length_squared()
+}
+
+type EyeWalk<'a> = Walk<'a, EyeState, <Everything as Carriage>::Eye>;
+type LightWalk<'a> = Walk<'a, LightState, <Everything as Carriage>::Light>;
+
+/// What the walks have at each vertex, from the light on.
+struct Walked<'a> {
+    light: Vec<(LightWalk<'a>, Vertex<'a>)>,
+    start: LightStart,
+    eye: Vec<(EyeWalk<'a>, Vertex<'a>)>,
+    /// The walk from the eye where it is at the light.
+    end: EyeWalk<'a>,
+}
+
+fn continuation(vertex: &Vertex<'_>, v: &Point<'_>, direction: Vec3, transport: Transport) -> Continuation {
+    let density = match v.specular {
+        true => Density::Delta,
+        false => Density::SolidAngle(vertex.evaluate(direction, transport).1),
+    };
+    let weight = Weight::Smooth(Scattered::default());
+    Continuation { direction, weight, density, eta: 1.0, crossing: vertex.crossing(direction) }
+}
+
+impl<'a> Path<'a> {
+    fn is_hit(&self) -> bool {
+        matches!(self.origin.place, Place::Surface(_) | Place::Sky(..))
+    }
+
+    fn distant(&self) -> bool {
+        self.origin.place.is_distant()
+    }
+
+    /// Follows the path from both ends, as renders do.
+    fn walk(&'a self, rules: &'a Rules, sampler: &'a Sampler) -> Option<Walked<'a>> {
+        let (scene, tally) = (self.scene, &mut Tally::new(1));
+        let towards = -self.vertices[0].to[0];
+        let from = match &self.origin.place {
+            Place::Surface(at) => at.position,
+            Place::Point(_, position) => *position,
+            _ => self.vertices[0].at.position - towards,
+        };
+        let cos = match &self.origin.place {
+            Place::Surface(at) => cosine(towards, at.ng),
+            _ => 1.0,
+        };
+        let ray = Ray::new(from, towards);
+        let emission = Emission { ray, radiance: Vec3::ONE, pdf: self.density.emission, cos };
+        let state = rules.language.light_start(rules.tag(self.origin.light))?;
+        let (mut walk, mut visitor) = set_out::<Everything>(
+            (scene, rules),
+            (sampler, NOW),
+            self.origin,
+            &emission,
+            state,
+            Keeps::Nothing,
+        );
+        let mut light = Vec::new();
+        for v in &self.vertices {
+            walk.arrive(&v.at);
+            visitor.arrives(&mut walk, &v.at, (0, 0), tally);
+            let vertex = Vertex::new(v.at, v.to[0], rules.letters)?;
+            light.push((walk.clone(), vertex.clone()));
+            let next = continuation(&vertex, v, v.to[1], Transport::Importance);
+            walk.scatterings += 1;
+            walk.follow::<FromLight<'a, Everything>>(&vertex, &next);
+        }
+        let ray = Ray::new(self.seen.end, -self.seen.direction);
+        let mut walk = from_eye::<Everything>(scene, rules, sampler, ray.at(NOW));
+        let mut eye = Vec::new();
+        for v in self.vertices.iter().rev() {
+            walk.arrive(&v.at);
+            let vertex = Vertex::new(v.at, v.to[1], rules.letters)?;
+            eye.push((walk.clone(), vertex.clone()));
+            let next = continuation(&vertex, v, v.to[0], Transport::Radiance);
+            walk.scatterings += 1;
+            walk.follow::<FromEye<'a, 'a, Everything, true>>(&vertex, &next);
+        }
+        eye.reverse();
+        if let Place::Surface(at) = &self.origin.place {
+            walk.arrive(at);
+        }
+        Some(Walked { light, start: visitor.start, eye, end: walk })
+    }
+
+    /// Density of next events from the second vertex over solid angle, or the probability of the light.
+    fn next_event_pdf(&self) -> f32 {
+        let lights = &self.scene.lights;
+        let v = &self.vertices[0];
+        match &self.origin.place {
+            Place::Surface(at) => {
+                lights.light_pdf(&self.scene.data, self.origin.light, v.at.position, at, v.to[0])
+            }
+            Place::Sky(..) => self.density.origin,
+            _ => lights.probability(self.origin.light),
+        }
+    }
+
+    /// What the render would say of the technique with `s` vertices from the light.
+    fn weight(&self, s: usize, walked: &Walked<'_>) -> f64 {
+        let count = self.vertices.len();
+        let first = &self.vertices[0];
+        let (cos, off) = match &self.origin.place {
+            Place::Surface(at) => (cosine(first.to[0], at.ng), squared(at.position, first.at.position)),
+            Place::Point(_, position) => (1.0, squared(*position, first.at.position)),
+            _ => (1.0, 1.0),
+        };
+        let pdf = self.next_event_pdf();
+        if s == 0 {
+            let next_event = if self.distant() { f64::from(pdf) } else { f64::from(pdf) * cos / off };
+            let light = self.origin.light;
+            let hit = Hit { light, radiance: Vec3::ONE, next_event, emission: self.density, jacobian: 0.0 };
+            return hit::weight(&walked.end, &hit);
+        }
+        if s == 1 {
+            let (walk, vertex) = &walked.eye[0];
+            let found_by = if self.is_hit() { FoundBy::Both } else { FoundBy::NextEvent };
+            let (direction, radiance) = (first.to[0], Vec3::ONE);
+            let end = ShadowEnd::Infinity;
+            let event = NextEvent { direction, radiance, pdf, cos, squared: off, found_by, end };
+            let bsdf_pdf = vertex.evaluate(direction, Transport::Radiance).1;
+            return next_event::weight(walk, vertex, self.origin.light, &event, bsdf_pdf);
+        }
+        let (light_walk, light) = &walked.light[s - 2];
+        let to_eye = self.vertices[s - 2].to[1];
+        let backward = light.evaluate(to_eye, Transport::Importance).1;
+        if s == count + 1 {
+            let off = squared(self.seen.end, light.at.position);
+            let end = LensEnd::new(light_walk, light, &self.seen, off, backward);
+            let reverse = f64::from(light.reverse_pdf(self.seen.direction));
+            return lens::weight(light_walk, &end, walked.start, reverse);
+        }
+        let (eye_walk, eye) = &walked.eye[s - 1];
+        let between = Between {
+            direction: -to_eye,
+            squared: squared(light.at.position, eye.at.position),
+            pdfs: [eye.evaluate(-to_eye, Transport::Radiance).1, backward],
+        };
+        let kept = LightVertex {
+            vertex: light.clone(),
+            carried: light_walk.carried,
+            partial: light_walk.partial,
+            media: light_walk.media,
+            vertices: s,
+            links: Vec::new(),
+            start: walked.start,
+        };
+        join::weight(eye_walk, eye, &kept, &between)
+    }
+
+    /// Density over solid angle of going on to one side (0: the light's, 1: the eye's), by the BSDF alone.
+    fn pdf(&self, i: usize, side: usize, rules: &Rules) -> f64 {
+        let Point { at, specular, to } = &self.vertices[i];
+        if *specular {
+            return 1.0;
+        }
+        let bsdf = Bsdf::keeping(&at.surface(), rules.letters);
+        let [wi, wo] = [to[side], to[1 - side]].map(|d| at.shading.to_local(d));
+        f64::from(bsdf.pdf(wo, wi))
+    }
+
+    /// Logarithms of the densities of all vertices from the light's side, the first also as a next event picks it, and from
+    /// the eye's.
+    fn densities(&self, rules: &Rules) -> (Vec<f64>, f64, Vec<f64>) {
+        let (scene, count) = (self.scene, self.vertices.len());
+        let chosen = f64::from(scene.lights.probability(self.origin.light));
+        let first = &self.vertices[0];
+        let disk = scene.data.bounds.radius() * 1.000_1;
+        // The place, the first edge, one over the cosine and squared length of what leads back to the light.
+        let (place, emitted, back, off) = match (&self.origin.place, scene.lights.light(self.origin.light)) {
+            (Place::Surface(at), Light::Triangle { instance, triangle }) => {
+                let [a, b, c] = scene.data.corners(*instance, *triangle, NOW).map(Vec3::as_dvec3);
+                let area = 0.5 * (b - a).cross(c - a).length();
+                let cos = cosine(first.to[0], at.ng);
+                let sides = if at.material.sides == Sides::Both { 2.0 } else { 1.0 };
+                (chosen / area, cos / (PI * sides), cos, squared(at.position, first.at.position))
+            }
+            (Place::Point(kind, position), _) => {
+                let solid_angle = match kind {
+                    PunctualKind::Spot { outer_cos, .. } => 2.0 * PI * (1.0 - f64::from(*outer_cos)),
+                    _ => 4.0 * PI,
+                };
+                (chosen, 1.0 / solid_angle, 1.0, squared(*position, first.at.position))
+            }
+            (Place::Sky(towards, _), _) => {
+                let sky = scene.environment.as_ref().unwrap();
+                (chosen * f64::from(sky.pdf(*towards)), 1.0 / (PI * disk * disk), 1.0, 1.0)
+            }
+            _ => (chosen, 1.0 / (PI * disk * disk), 1.0, 1.0),
+        };
+        let picked = match &self.origin.place {
+            Place::Surface(_) => f64::from(self.next_event_pdf()) * back / off,
+            _ => place,
+        };
+        let mut from_light = vec![place.ln(), (emitted * cosine(first.to[0], first.at.ng) / off).ln()];
+        let mut from_eye = vec![(self.pdf(0, 0, rules) * back / off).ln()];
+        for i in 1..count {
+            let [a, b] = [&self.vertices[i - 1], &self.vertices[i]];
+            let off = squared(a.at.position, b.at.position);
+            from_light.push((self.pdf(i - 1, 1, rules) * cosine(b.to[0], b.at.ng) / off).ln());
+            from_eye.push((self.pdf(i, 0, rules) * cosine(a.to[1], a.at.ng) / off).ln());
+        }
+        let last = &self.vertices[count - 1];
+        let cos = cosine(last.to[1], last.at.ng);
+        from_eye.push(match self.seen.pdf {
+            Importance::SolidAngle(pdf) => (pdf * cos / squared(self.seen.end, last.at.position)).ln(),
+            Importance::Area(pdf) => (pdf * cos).ln(),
+        });
+        (from_light, picked.ln(), from_eye)
+    }
+
+    /// Logarithm of how often each technique makes the path, from s = 0 to all but the lens; minus infinity where it cannot.
+    fn techniques(&self, rules: &Rules) -> Vec<f64> {
+        let (from_light, picked, from_eye) = self.densities(rules);
+        let count = self.vertices.len();
+        let specular = |vertex: usize| (1..=count).contains(&vertex) && self.vertices[vertex - 1].specular;
+        let of = |s: usize| {
+            let joined = if s == 0 { self.is_hit() } else { !specular(s - 1) && !specular(s) };
+            if !joined {
+                return f64::NEG_INFINITY;
+            }
+            let light: f64 = if s == 1 { picked } else { from_light[..s].iter().sum() };
+            let splats = if s == count + 1 { rules.light_paths.ln() } else { 0.0 };
+            light + from_eye[s..].iter().sum::<f64>() + splats
+        };
+        (0..count + 2).map(of).collect()
+    }
+}
+
+/// How far off weights were.
+#[derive(Debug, Default)]
+struct Found {
+    paths: u32,
+    longest: usize,
+    lights: [u32; 4],
+    sum: f64,
+    weight: f64,
+}
+
+fn check(kind: Kind, most: usize, seed: u32, tries: u32, found: &mut Found) {
+    let mut numbers = Numbers { sampler: Sampler::new(11, 0, [most as u32, kind as u32], seed), next: 0 };
+    let scene = scene(kind, &mut numbers);
+    let heuristics = [(Heuristic::Balance, Weights::Balance), (Heuristic::Power, Weights::Power)];
+    for (h, weights) in heuristics {
+        let rules = Rules::new(&scene, &settings(weights), 64).unwrap();
+        for _ in 0..tries {
+            let Some(path) = path(&scene, &rules, most, &mut numbers) else { continue };
+            let sampler = Sampler::new(1, 0, [0, 0], 0);
+            let Some(walked) = path.walk(&rules, &sampler) else { continue };
+            let densities = path.techniques(&rules);
+            let able = |s: &usize| densities[*s] > f64::NEG_INFINITY;
+            let mut sum = 0.0;
+            for s in (0..densities.len()).filter(able) {
+                let recursive = path.weight(s, &walked);
+                let all = (0..densities.len()).filter(able);
+                let written_out = 1.0 / all.map(|o| h.of((densities[o] - densities[s]).exp())).sum::<f64>();
+                let off = (recursive - written_out).abs() / written_out.max(1e-200);
+                let what = || {
+                    let (place, n) = (&path.origin.place, path.vertices.len());
+                    format!(
+                        "{kind:?} {seed}, {h:?}, {n} vertices, s = {s}: {recursive} {written_out} {place:?}"
+                    )
+                };
+                assert!(off <= 1e-6, "{}", what());
+                (found.weight, sum) = (found.weight.max(off), sum + recursive);
+            }
+            if densities.iter().any(|d| *d > f64::NEG_INFINITY) {
+                assert!((sum - 1.0_f64).abs() <= 1e-9, "{kind:?} {seed}, {h:?}: {sum}");
+                found.sum = found.sum.max((sum - 1.0).abs());
+                found.paths += 1;
+                found.longest = found.longest.max(path.vertices.len());
+                found.lights[match path.origin.place {
+                    Place::Surface(_) => 0,
+                    Place::Point(..) => 1,
+                    Place::Sky(..) => 2,
+                    Place::Sun(..) => 3,
+                }] += 1;
+            }
+        }
+    }
+}
+
+#[test]
+fn short_paths_in_random_scenes() {
+    let mut found = Found::default();
+    for seed in 0..300 {
+        for most in 1..=6 {
+            check(Kind::Any, most, seed, 4, &mut found);
+        }
+    }
+    assert!(found.paths > 4000 && found.lights.iter().all(|n| *n > 200), "{found:?}");
+}
+
+#[test]
+fn paths_of_two_hundred_vertices_between_narrow_and_matt_walls() {
+    let mut found = Found::default();
+    for seed in 0..20 {
+        check(Kind::Tunnel, 198, seed, 3, &mut found);
+    }
+    assert!(found.paths > 60 && found.longest >= 198, "{found:?}");
+}
