@@ -71,6 +71,9 @@ impl From<FarmError> for ApiError {
             FarmError::Request(faults) | FarmError::Patch(faults) => {
                 of(StatusCode::UNPROCESSABLE_ENTITY, "invalid-job", "Invalid job").at(faults)
             }
+            FarmError::Worker(faults) => {
+                of(StatusCode::UNPROCESSABLE_ENTITY, "invalid-worker", "Invalid worker").at(faults)
+            }
             FarmError::Scene(faults) => {
                 of(StatusCode::UNPROCESSABLE_ENTITY, "invalid-scene", "Invalid scene").at(faults)
             }
@@ -87,8 +90,9 @@ impl From<FarmError> for ApiError {
                 of(StatusCode::UNPROCESSABLE_ENTITY, "idempotency-key-taken", "Idempotency key taken")
             }
             FarmError::NoPicture(_) => of(StatusCode::NOT_FOUND, "no-picture-yet", "No picture yet"),
+            FarmError::NeverPicture(_) => of(StatusCode::NOT_FOUND, "no-picture", "No picture"),
             FarmError::NoLayer(_) => of(StatusCode::NOT_FOUND, "no-layer", "No such layer"),
-            FarmError::Blob(BlobError::Full) => {
+            FarmError::Full | FarmError::Blob(BlobError::Full) => {
                 of(StatusCode::INSUFFICIENT_STORAGE, "storage-full", "Storage full")
             }
             FarmError::Stopping | FarmError::Store(StoreError::Closed) => {

@@ -3,13 +3,13 @@
 use super::{
     body::Document,
     error::{ApiError, Result},
-    params::{Params, cursor, id, limit},
+    params::{Named, Params, cursor, id, limit},
     tag,
 };
 use crate::farm::{Farm, spec::JobSpec};
 use axum::{
     Json,
-    extract::{Path, State},
+    extract::State,
     http::{HeaderMap, StatusCode, header},
     response::{IntoResponse as _, Response},
 };
@@ -98,20 +98,20 @@ pub async fn list(
 }
 
 /// A job.
-pub async fn get(State(farm): State<Arc<Farm>>, Path(name): Path<String>) -> Result<Response> {
+pub async fn get(State(farm): State<Arc<Farm>>, Named(name): Named) -> Result<Response> {
     Ok(with_tag(farm.status(&id("job", &name)?).await?))
 }
 
 /// A job is changed.
 pub async fn patch(
     State(farm): State<Arc<Farm>>,
-    Path(name): Path<String>,
+    Named(name): Named,
     headers: HeaderMap,
     Document(patch): Document<JobPatch>,
 ) -> Result<Response> {
     let id: JobId = id("job", &name)?;
-    let version = tag::match_version(&headers)?;
-    Ok(with_tag(farm.patch(&id, &patch, version).await?))
+    let versions = tag::match_versions(&headers)?;
+    Ok(with_tag(farm.patch(&id, &patch, versions).await?))
 }
 
 /// How a job is deleted.
@@ -125,7 +125,7 @@ pub struct DeleteParams {
 /// A job is cancelled, or removed with its files.
 pub async fn delete(
     State(farm): State<Arc<Farm>>,
-    Path(name): Path<String>,
+    Named(name): Named,
     Params(params): Params<DeleteParams>,
 ) -> Result<Response> {
     let id: JobId = id("job", &name)?;

@@ -117,7 +117,8 @@ async fn a_job_is_rendered_over_http_alone() {
     let image = format!("/v1/jobs/{job}/image.exr");
     doors.get(&image).await.problem(404, "no-picture-yet");
 
-    let join = json!({"name": "w", "threads": 1, "build": "0", "instruction_set": "any"});
+    let join =
+        json!({"name": "w", "threads": 1, "build": env!("CARGO_PKG_VERSION"), "instruction_set": "any"});
     let joined = doors.post("/v1/workers", &join).await;
     assert_eq!(joined.status, StatusCode::CREATED);
     let worker = serde_json::from_slice::<WorkerJoined>(&joined.body).unwrap().id;
@@ -157,6 +158,9 @@ async fn every_error_is_a_problem_document() {
     doors.get("/v1/jobs/none/image.exr").await.problem(404, "not-found");
     doors.get("/v1/jobs/none/events").await.problem(404, "not-found");
     doors.get("/v1/scenes/zz").await.problem(404, "not-found");
+    doors.get("/v1/jobs/%ff").await.problem(400, "invalid-path");
+    doors.get("/v1/scenes/%c3%28/bytes").await.problem(400, "invalid-path");
+    doors.send(Method::PUT, "/v1/leases/%fe/sum", &[], "x").await.problem(400, "invalid-path");
     doors.get("/v1/jobs?limit=0").await.problem(400, "invalid-parameter");
     doors.get("/v1/jobs?limit=many").await.problem(400, "invalid-parameter");
     doors.get("/v1/jobs?cursor=x").await.problem(400, "invalid-parameter");
@@ -176,6 +180,12 @@ async fn every_error_is_a_problem_document() {
         (r#"{"layers": ["a", 3]}"#, "/layers/1"),
         (r#"{"scene": "xyz"}"#, "/scene"),
         (r#""x""#, ""),
+        ("[]", ""),
+        (r#"["abc"]"#, ""),
+        ("null", ""),
+        (r#"{"method": 3}"#, "/method"),
+        (r#"{"weights": [1]}"#, "/weights"),
+        (r#"{"shadows": {"a": 1}}"#, "/shadows"),
     ] {
         let answer = doors.send(Method::POST, "/v1/jobs", &[json], document).await;
         let problem = answer.problem(422, "invalid-document");
@@ -332,11 +342,23 @@ async fn a_job_is_sent_once_checked_changed_and_cancelled() {
     patch(&tag, json!({"priority": 4})).await.problem(412, "changed-since");
     patch("*", json!({"state": "done"})).await.problem(422, "invalid-job");
     patch("3", json!({})).await.problem(400, "invalid-header");
+    let weak = format!("W/{}", changed.head("etag"));
+    patch(&weak, json!({"priority": 4})).await.problem(412, "changed-since");
+    patch("\"of something else\"", json!({"priority": 4})).await.problem(412, "changed-since");
+    let several = format!("\"0\", {}", changed.head("etag"));
+    assert_eq!(patch(&several, json!({"priority": 3})).await.status, StatusCode::OK);
+    patch("*", json!({"samples": "many"})).await.problem(422, "invalid-document");
+    let fewer = patch("*", json!({"samples": 1})).await.problem(422, "invalid-job");
+    assert_eq!(fewer.errors[0].pointer, "/samples");
     assert_eq!(patch("*", json!({"state": "paused"})).await.json()["state"], "paused");
 
     let cancelled = doors.send(Method::DELETE, &path, &[], "").await;
     assert_eq!((cancelled.status, cancelled.json()["state"].as_str()), (StatusCode::OK, Some("cancelled")));
     patch("*", json!({"priority": 4})).await.problem(409, "job-over");
+    doors.bench.until_settled(&path[9..].parse().unwrap(), JobState::Cancelled).await;
+    let never = doors.get(&format!("{path}/image.exr")).await;
+    assert!(!never.problem(404, "no-picture").detail.contains("later"));
+    assert_eq!(never.head("retry-after"), "");
     let purged = doors.send(Method::DELETE, &format!("{path}?purge=true"), &[], "").await;
     assert_eq!(purged.status, StatusCode::NO_CONTENT);
     doors.get(&path).await.problem(404, "not-found");
@@ -394,6 +416,12 @@ async fn events_tell_each_checkpoint_once_and_go_on_where_a_client_was() {
     }
     let (status, rest) = events(&doors, &path, Some(&seen.last().unwrap().0)).await;
     assert_eq!((status, rest.len()), (StatusCode::NO_CONTENT, 0));
+    for bogus in ["x", "1.2", "1.2.99999999999999999999", "-1.0.0"] {
+        let answer = doors.send(Method::GET, &path, &[("last-event-id", bogus)], "").await;
+        answer.problem(400, "invalid-header");
+    }
+    let (status, _) = events(&doors, &path, Some("9.999.9")).await;
+    assert_eq!(status, StatusCode::OK, "one that is not yet is no reason to fall");
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -49,7 +49,7 @@ impl Embedded {
         let cache = data.join("worker-scenes");
         let listen = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
         let serving =
-            start(ServeConfig { listen, data }).await.map_err(|e| CommandError::failed(e.to_string()))?;
+            start(ServeConfig { listen, data }).await.map_err(|e| CommandError::wrong(e.to_string()))?;
         let threads = plan.threads.map_or_else(|| share_of_cores(plan.workers), NonZeroUsize::get);
         let farm = serving.address;
         let team = Team { count: plan.workers, threads, farm, cache, log: plan.log };

@@ -27,7 +27,7 @@ pub(crate) struct Render {
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1024))]
     workers: u32,
     /// Threads of each worker process [default: the cores shared out].
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = ovtigre_worker::flags::threads)]
     threads: Option<NonZeroUsize>,
     /// Folder in which the farm keeps its memory [default: a temporary one].
     #[arg(long, value_name = "DIR")]

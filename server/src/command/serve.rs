@@ -28,7 +28,7 @@ pub(crate) struct Serve {
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(..=1024))]
     workers: u32,
     /// Threads of each of them [default: the cores shared out].
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = ovtigre_worker::flags::threads)]
     threads: Option<NonZeroUsize>,
     /// Listen on other addresses than loopback although anyone who reaches them may do anything.
     #[arg(long)]

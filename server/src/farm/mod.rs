@@ -1,6 +1,7 @@
 //! Rules, no HTTP: submit, split, lease, commit, append, checkpoint, stop, reap.
 
 pub mod append;
+pub mod audit;
 pub mod book;
 pub mod checkpoint;
 pub mod commit;
@@ -9,7 +10,9 @@ pub mod counters;
 pub mod crew;
 pub mod curve;
 pub mod error;
+pub mod extend;
 pub mod ids;
+pub mod join;
 pub mod lease;
 pub mod live;
 pub mod open;
@@ -19,6 +22,7 @@ pub mod reach;
 pub mod reap;
 pub mod rules;
 pub mod scene;
+pub mod space;
 pub mod spec;
 pub mod split;
 pub mod status;
@@ -62,6 +66,7 @@ pub struct Farm {
     pub stopping: CancellationToken,
     inspect: Inspect,
     ids: Ids,
+    fullness: space::Fullness,
     tasks: TaskTracker,
     decoders: tokio::sync::Semaphore,
     inspectors: tokio::sync::Semaphore,

@@ -41,6 +41,7 @@ impl Farm {
             counters: super::counters::Counters::default(),
             stopping: tokio_util::sync::CancellationToken::new(),
             inspect,
+            fullness: super::space::Fullness::default(),
             ids: super::ids::Ids::new(),
             tasks: tokio_util::task::TaskTracker::new(),
             decoders: Semaphore::new(processors),
@@ -49,6 +50,7 @@ impl Farm {
             crew: Mutex::default(),
             lives: Mutex::default(),
         });
+        farm.look_at_room();
         farm.sweep().await?;
         for row in farm.store.unsettled_jobs().await? {
             farm.take_up(&row).await?;
@@ -103,10 +105,12 @@ impl Farm {
         let plan = Plan::new(schedule, ledger.cursors, ledger.returned, ledger.checkpoints);
         let hand_out = if row.state == JobState::Paused { HandOut::Paused } else { HandOut::Yes };
         let settings = live.spec.settings.clone();
-        let entry = Entry::new(row.scene.clone(), settings, plan, row.priority, row.sequence, hand_out);
+        let wants = live.spec.wants(row.class.clone());
+        let order = (row.priority, row.sequence);
+        let entry = Entry::new(row.scene.clone(), settings, plan, order, hand_out, wants);
         let mut book = self.book();
         book.add(row.id.clone(), entry);
-        ledger.leases.into_iter().for_each(|lease| book.hold(lease));
+        ledger.leases.into_iter().for_each(|lease| book.hold(lease, None));
         Ok(())
     }
 }

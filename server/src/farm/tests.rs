@@ -2,7 +2,11 @@
 
 pub(crate) mod bench;
 mod ending;
+mod extending;
 mod faults;
 mod layers;
 mod merging;
+mod sharing;
+mod space;
 mod submitting;
+mod trust;

@@ -42,7 +42,7 @@ pub(crate) struct Bench {
 
 /// Fast enough for tests, else as always.
 pub(crate) fn rules() -> Rules {
-    Rules { tick: Duration::from_millis(10), rest: Duration::ZERO, ..Rules::default() }
+    Rules { tick: Duration::from_millis(10), rest: Duration::ZERO, kept_sums_bytes: 0, ..Rules::default() }
 }
 
 async fn open(folder: &TempDir, rules: Rules) -> Arc<Farm> {
@@ -65,14 +65,14 @@ async fn open(folder: &TempDir, rules: Rules) -> Arc<Farm> {
 impl Bench {
     pub(crate) async fn new(rules: Rules) -> Self {
         let folder = tempfile::tempdir().unwrap();
-        Self { farm: open(&folder, rules).await, rules, folder }
+        Self { farm: open(&folder, rules.clone()).await, rules, folder }
     }
 
     /// As after the process was killed: nothing is waited for.
     pub(crate) async fn crash(self) -> Self {
         self.farm.stopping.cancel();
         self.farm.store.close().await;
-        let farm = open(&self.folder, self.rules).await;
+        let farm = open(&self.folder, self.rules.clone()).await;
         Self { farm, ..self }
     }
 
@@ -99,13 +99,18 @@ impl Bench {
     }
 
     pub(crate) async fn worker(&self) -> WorkerId {
-        let join = WorkerJoin {
+        self.worker_as(|_| ()).await
+    }
+
+    pub(crate) async fn worker_as(&self, change: impl FnOnce(&mut WorkerJoin)) -> WorkerId {
+        let mut join = WorkerJoin {
             name: "test".to_owned(),
             threads: 1,
-            build: "0".to_owned(),
+            build: env!("CARGO_PKG_VERSION").to_owned(),
             instruction_set: "any".to_owned(),
             tags: Vec::new(),
         };
+        change(&mut join);
         self.farm.join(join).await.unwrap().id
     }
 
@@ -186,21 +191,24 @@ impl Bench {
         layers.channels.into_iter().map(|(name, values)| (name, bits(values))).collect()
     }
 
-    /// Files under `jobs/`, by the end of their names.
-    pub(crate) fn files(&self, job: &JobId) -> Vec<String> {
+    /// Files under `jobs/`.
+    pub(crate) fn paths(&self, job: &JobId) -> Vec<std::path::PathBuf> {
         let mut folders = vec![self.folder.path().join("blobs/jobs").join(job.as_str())];
         let mut files = Vec::new();
         while let Some(folder) = folders.pop() {
             for entry in std::fs::read_dir(folder).into_iter().flatten() {
                 let path = entry.unwrap().path();
-                if path.is_dir() {
-                    folders.push(path);
-                } else {
-                    files.push(path.file_name().unwrap().to_str().unwrap().to_owned());
-                }
+                if path.is_dir() { folders.push(path) } else { files.push(path) }
             }
         }
+        files.sort();
         files
+    }
+
+    /// Files under `jobs/`, by the end of their names.
+    pub(crate) fn files(&self, job: &JobId) -> Vec<String> {
+        let name = |path: &std::path::PathBuf| path.file_name().unwrap().to_str().unwrap().to_owned();
+        self.paths(job).iter().map(name).collect()
     }
 }
 

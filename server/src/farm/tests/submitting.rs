@@ -50,6 +50,11 @@ async fn a_request_that_cannot_be_followed_is_refused_where_it_is_wrong() {
         ("/shutter", Box::new(|r| r.shutter = Some([0.5, 0.0]))),
         ("/shutter", Box::new(|r| r.shutter = Some([0.0, f64::INFINITY]))),
         ("/name", Box::new(|r| r.name = Some("x".repeat(1000)))),
+        ("/name", Box::new(|r| r.name = Some("a\u{7}".to_owned()))),
+        ("/layers/0", Box::new(|r| r.layers = vec!["a\u{1b}=LE".to_owned()])),
+        ("/weight", Box::new(|r| r.weight = Some(0))),
+        ("/max_workers", Box::new(|r| r.max_workers = Some(0))),
+        ("/tags/0", Box::new(|r| r.tags = vec![String::new()])),
     ];
     for (pointer, change) in cases {
         let mut request = JobRequest { scene: Some(scene.clone()), ..JobRequest::default() };

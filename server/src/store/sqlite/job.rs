@@ -143,6 +143,7 @@ fn read(row: &SqliteRow) -> Result<JobRow> {
         certified: row.try_get("certified")?,
         manifest: row.try_get("manifest")?,
         settled: row.try_get("settled")?,
+        class: row.try_get("class")?,
     })
 }
 
@@ -178,7 +179,6 @@ pub(super) async fn change(
             .bind(certified)
             .execute(&mut *db)
             .await?;
-        sqlx::query("DELETE FROM snapshot WHERE job = ?").bind(id.as_str()).execute(&mut *db).await?;
     }
     Ok(true)
 }

@@ -2,6 +2,7 @@
 
 mod column;
 mod commit;
+mod control;
 mod job;
 mod ledger;
 mod worker;
@@ -11,8 +12,9 @@ use super::{
     Store,
     error::{Result, StoreError},
     row::{
-        Added, Claim, CommitOutcome, CommitRow, Counts, IdempotencyKey, JobChange, JobFilter, JobRow, Lane,
-        Ledger, NewCheckpoint, NewCommit, NewJob, Released, SceneRow, WorkerRow,
+        Added, BatchKey, Claim, CommitOutcome, CommitRow, Counts, Extension, IdempotencyKey, JobChange,
+        JobFilter, JobRow, Lane, Ledger, NewCheckpoint, NewCommit, NewJob, Released, SceneRow, TokenRow,
+        WorkerRow,
     },
 };
 use ovtigre_proto::{
@@ -198,6 +200,51 @@ impl Store for Sqlite {
 
     async fn workers_of(&self, job: &JobId) -> Result<u32> {
         ledger::workers_of(&mut *self.reader().await?, job).await
+    }
+
+    async fn uncommit(&self, job: &JobId, batches: Vec<BatchKey>, lanes: Vec<Lane>) -> Result<()> {
+        let job = job.clone();
+        self.writer
+            .write(move |db| Box::pin(async move { control::uncommit(db, &job, batches, lanes).await }))
+            .await
+    }
+
+    async fn commits_by(&self, worker: &WorkerId) -> Result<Vec<(JobId, BatchKey)>> {
+        control::commits_by(&mut *self.reader().await?, worker).await
+    }
+
+    async fn pin_job(&self, id: &JobId, class: &str) -> Result<Option<String>> {
+        let (id, class) = (id.clone(), class.to_owned());
+        self.writer.write(move |db| Box::pin(async move { control::pin_job(db, &id, &class).await })).await
+    }
+
+    async fn extend_job(&self, id: &JobId, version: u64, to: Extension) -> Result<bool> {
+        let id = id.clone();
+        self.writer
+            .write(move |db| Box::pin(async move { control::extend_job(db, &id, version, to).await }))
+            .await
+    }
+
+    async fn set_aside(&self, worker: &WorkerId, reason: &str) -> Result<bool> {
+        let (id, reason) = (worker.clone(), reason.to_owned());
+        self.writer.write(move |db| Box::pin(async move { control::set_aside(db, &id, &reason).await })).await
+    }
+
+    async fn add_token(&self, token: TokenRow) -> Result<()> {
+        self.writer.write(|db| Box::pin(control::add_token(db, token))).await
+    }
+
+    async fn tokens(&self) -> Result<Vec<TokenRow>> {
+        control::tokens(&mut *self.reader().await?).await
+    }
+
+    async fn token(&self, hash: &BlobId) -> Result<Option<TokenRow>> {
+        control::token(&mut *self.reader().await?, hash).await
+    }
+
+    async fn remove_token(&self, id: &str) -> Result<bool> {
+        let id = id.to_owned();
+        self.writer.write(move |db| Box::pin(async move { control::remove_token(db, &id).await })).await
     }
 
     async fn forget_keys(&self, age: Duration) -> Result<()> {

@@ -87,6 +87,7 @@ fn read(row: &SqliteRow) -> Result<WorkerRow> {
         batches_done: count(row, "batches_done")?,
         failures: count(row, "failures")?,
         rays_per_second: row.try_get("rays_per_second")?,
+        reason: row.try_get("reason")?,
     })
 }
 
