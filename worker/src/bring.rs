@@ -2,6 +2,11 @@
 
 use crate::desk::Desk;
 use bytes::Bytes;
+use ovtigre_core::film::{
+    exr::{PartialAttributes, write_partial},
+    size::Size,
+    sum::Sum,
+};
 use ovtigre_proto::{
     client::farm::Client,
     id::LeaseId,
@@ -14,15 +19,29 @@ use std::sync::Arc;
 pub struct Rendered {
     /// Whose.
     pub lease: LeaseId,
-    /// Its partial EXR.
-    pub sum: Bytes,
+    /// Its sum.
+    pub sum: Sum,
+    /// The frame's size.
+    pub size: Size,
+    /// What its partial EXR says of it.
+    pub attributes: PartialAttributes,
     /// Time spent on it in seconds.
     pub seconds: f64,
 }
 
-/// Brings a sum until the farm has taken or refused it; takes its lease off the desk.
+/// Brings a sum until the farm has taken or refused it; takes its lease off the desk. Its file is written here,
+/// while the pool renders the next batch.
 pub async fn bring(client: Client, desk: Arc<Desk>, rendered: Rendered) {
-    let Rendered { lease, sum, seconds } = rendered;
+    let Rendered { lease, sum, size, attributes, seconds } = rendered;
+    let partial = tokio::task::spawn_blocking(move || Bytes::from(write_partial(&sum, size, &attributes)));
+    let sum = match partial.await {
+        Ok(sum) => sum,
+        Err(error) => {
+            desk.remove(&lease);
+            return give_back(&client, &lease, FailureKind::Worker, format!("writing a sum failed: {error}"))
+                .await;
+        }
+    };
     let mut backoff = client.backoff();
     loop {
         match client.bring(&lease, sum.clone(), seconds).await {

@@ -9,7 +9,7 @@ use crate::{
     scenes::{SceneError, SceneFolder},
 };
 use ovtigre_core::{
-    film::exr::{PartialAttributes, write_partial},
+    film::exr::PartialAttributes,
     settings::{EnvironmentSource, Settings},
 };
 use ovtigre_proto::{
@@ -151,8 +151,8 @@ impl<R: Renderer> Labour<R> {
             scene: scene_id.to_string(),
             method: settings.method.name().to_owned(),
         };
-        let sum = write_partial(&sum, settings.size, &attributes).into();
-        Ok(Some(Rendered { lease: id.clone(), sum, seconds: start.elapsed().as_secs_f64() }))
+        let seconds = start.elapsed().as_secs_f64();
+        Ok(Some(Rendered { lease: id.clone(), sum, size: settings.size, attributes, seconds }))
     }
 
     fn scene(&self, lease: &Lease, files: Option<Files>) -> Result<Arc<R::Scene>, Failed> {

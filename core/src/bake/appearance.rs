@@ -35,6 +35,10 @@ impl Appearance {
         surface.base_color = Rgb::ONE;
         let white = reflectance::mean(&Bsdf::from_surface(&surface));
         let colour = at.at.colour;
+        if let Some(shown) = at.shown() {
+            let over_base = colour.truncate().extend(colour.w.clamp(0.0, 1.0));
+            return Self { radiance: shown, over_base, alpha: at.alpha(), at: at.at };
+        }
         Self {
             radiance: at.emission(element.side()) + own * arriving,
             over_base: (white * arriving * colour.truncate()).extend(colour.w.clamp(0.0, 1.0)),

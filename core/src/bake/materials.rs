@@ -34,7 +34,9 @@ impl Materials {
         let base = if colour_is_whole(material) {
             json!({"baseColorFactor": [1.0, 1.0, 1.0, 1.0]})
         } else {
-            let factor = material.base_color.factor.clamp(glam::Vec4::ZERO, glam::Vec4::ONE);
+            let factor = material.base_color.factor;
+            let factor = material.unlit.map_or(factor, |shown| shown.extend(factor.w));
+            let factor = factor.clamp(glam::Vec4::ZERO, glam::Vec4::ONE);
             let mut base = json!({"baseColorFactor": factor.to_array()});
             if let Some(slot) = &material.base_color.texture {
                 base["baseColorTexture"] = json!({"index": self.texture(writer, data, slot.texture.0)});

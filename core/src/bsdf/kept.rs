@@ -102,6 +102,15 @@ impl Kept {
         (total > 0.0).then(|| lobes.map(|(weight, albedo)| (weight, albedo / total)))
     }
 
+    /// The luminance of what it reflects and transmits of light towards `wo`.
+    pub(super) fn luminance(&self, wo: Vec3) -> f32 {
+        let of = |lobe| {
+            let (weight, albedo) = self.letter(lobe).and_then(|_| self.weight_and_albedo(lobe, wo))?;
+            Some(weight * luminance(albedo))
+        };
+        LOBES.into_iter().filter_map(of).sum()
+    }
+
     pub(super) fn evaluate(&self, wo: Vec3, wi: Vec3, transport: Transport) -> Evaluated {
         let Some(chances) = self.chances(wo) else { return Evaluated::default() };
         let mut all = Evaluated::default();

@@ -13,9 +13,11 @@ pub mod glass;
 mod gloss;
 pub mod kept;
 pub mod lambert;
+pub mod layered;
 mod lobe;
 pub mod mixture;
 pub mod plastic;
+mod sheen;
 mod sheet;
 mod solid;
 mod solid_albedo;
@@ -31,10 +33,11 @@ use crate::bsdf::fresnel::{Schlick, dielectric_at_normal};
 use crate::bsdf::glass::Glass;
 use crate::bsdf::kept::Kept;
 use crate::bsdf::lambert::Lambert;
+use crate::bsdf::layered::Layered;
 use crate::bsdf::lobe::{Delta, Drawn, Evaluated};
 use crate::bsdf::mixture::Mixture;
 use crate::bsdf::plastic::Plastic;
-use crate::bsdf::surface::SurfaceParameters;
+use crate::bsdf::surface::{Layers, SurfaceParameters};
 use crate::math::colour::Rgb;
 use glam::{Vec2, Vec3};
 
@@ -56,17 +59,25 @@ pub enum Bsdf {
     Mixture(Mixture),
     /// Some lobes of any of them.
     Kept(Kept),
+    /// Any of them under a coat or cloth.
+    Layered(Layered),
 }
 
 impl Bsdf {
     /// metallic · conductor + (1 − metallic) · ((1 − transmission) · plastic + transmission · glass).
     pub fn from_surface(given: &SurfaceParameters) -> Self {
+        if given.layers.is_some() {
+            return Self::layered(given, Letters::NATURAL);
+        }
         Self::whole(&clamped(given))
     }
 
     /// The same with no lobes but those of `letters`. With the letter `S_T` among them every glossy lobe has, beside itself
     /// if that is kept, an ideal twin: what it would be at roughness 0.
     pub fn keeping(given: &SurfaceParameters, letters: Letters) -> Self {
+        if given.layers.is_some() {
+            return Self::layered(given, letters);
+        }
         let s = clamped(given);
         let whole = Self::whole(&s);
         let own = whole.letters();
@@ -76,6 +87,21 @@ impl Bsdf {
             // Nothing but diffuse.
             Self::Lambert(_) => Self::Kept(Kept::new(&Mixture::NONE, letters)),
             _ => Self::Kept(Kept::new(&mixture(&s), letters)),
+        }
+    }
+
+    #[inline(never)]
+    fn layered(given: &SurfaceParameters, letters: Letters) -> Self {
+        let s = clamped(given);
+        let below = match Self::whole(&s) {
+            // Nothing but diffuse: black stays black.
+            Self::Lambert(lambert) if lambert.reflectance == Rgb::ZERO => Mixture::NONE,
+            _ => mixture(&s),
+        };
+        let below = Kept::new(&below, letters);
+        match &s.layers {
+            Some(layers) => Self::Layered(Layered::new(layers, below, letters, s.walls)),
+            None => Self::Kept(below),
         }
     }
 
@@ -103,6 +129,7 @@ impl Bsdf {
             Self::Glass(part) => part.letters(),
             Self::Mixture(part) => part.letters(),
             Self::Kept(part) => part.letters(),
+            Self::Layered(part) => part.letters(),
         }
     }
 
@@ -144,6 +171,7 @@ impl Bsdf {
             Self::Glass(part) => part.draw(wo, u_lobe, u, transport)?,
             Self::Mixture(part) => part.draw(wo, u_lobe, u, transport)?,
             Self::Kept(part) => part.draw(wo, u_lobe, u, transport)?,
+            Self::Layered(part) => part.draw(wo, u_lobe, u, transport)?,
         };
         let kind = if let Some(delta) = delta {
             let Delta { value, probability, letter } = delta;
@@ -170,6 +198,7 @@ impl Bsdf {
             Self::Glass(part) => part.evaluate(wo, wi, transport),
             Self::Mixture(part) => part.evaluate(wo, wi, transport),
             Self::Kept(part) => part.evaluate(wo, wi, transport),
+            Self::Layered(part) => part.evaluate(wo, wi, transport),
         }
     }
 }
@@ -215,5 +244,12 @@ fn clamped(s: &SurfaceParameters) -> SurfaceParameters {
         ior: s.ior.max(0.0).min(f32::MAX),
         transmission: unit(s.transmission),
         walls: s.walls,
+        layers: s.layers.map(|layers| Layers {
+            coat: unit(layers.coat),
+            coat_roughness: unit(layers.coat_roughness),
+            coat_normal: layers.coat_normal,
+            sheen: Rgb::from_array(layers.sheen.to_array().map(unit)),
+            sheen_roughness: unit(layers.sheen_roughness),
+        }),
     }
 }

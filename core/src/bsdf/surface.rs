@@ -1,6 +1,7 @@
 //! What a glTF material says at one point.
 
 use crate::math::colour::Rgb;
+use glam::Vec3;
 
 /// What is behind a transmitting surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -9,6 +10,21 @@ pub enum Walls {
     Thin,
     /// A solid: the side of −z is inside, and light is refracted.
     Solid,
+}
+
+/// What lies on a surface, textures applied.
+#[derive(Clone, Copy, Debug)]
+pub struct Layers {
+    /// `clearcoatFactor`, in 0..=1.
+    pub coat: f32,
+    /// Perceptual roughness of the coat.
+    pub coat_roughness: f32,
+    /// The coat's normal in the shading frame; of unit length, z > 0.
+    pub coat_normal: Vec3,
+    /// `sheenColorFactor`, in 0..=1.
+    pub sheen: Rgb,
+    /// Perceptual roughness of the sheen.
+    pub sheen_roughness: f32,
 }
 
 /// A glTF metallic-roughness surface with `KHR_materials_specular`, `_ior`, `_transmission` and
@@ -31,4 +47,6 @@ pub struct SurfaceParameters {
     pub transmission: f32,
     /// What transmitted light enters.
     pub walls: Walls,
+    /// What lies on it.
+    pub layers: Option<Layers>,
 }

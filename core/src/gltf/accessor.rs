@@ -1,7 +1,7 @@
 //! Typed elements of buffers: strided, normalised, sparse.
 
 use crate::gltf::buffers::Buffers;
-use crate::gltf::document::Document;
+use crate::gltf::document::{At, Document};
 use crate::gltf::error::LoadError;
 use crate::gltf::limits::Limits;
 
@@ -90,7 +90,7 @@ impl Component {
         })
     }
 
-    fn size(self) -> usize {
+    pub(crate) fn size(self) -> usize {
         match self {
             Self::I8 | Self::U8 => 1,
             Self::I16 | Self::U16 => 2,
@@ -112,6 +112,33 @@ impl Component {
         if normalised { (value / one).max(-1.0) } else { value }
     }
 
+    /// Whether an unsigned integer of this type reaches `index`.
+    pub(crate) fn holds_index(self, index: u32) -> bool {
+        match self {
+            Self::U8 => index <= u32::from(u8::MAX),
+            Self::U16 => index <= u32::from(u16::MAX),
+            Self::U32 => true,
+            Self::I8 | Self::I16 | Self::F32 => false,
+        }
+    }
+
+    /// Appends the low bits of an index.
+    pub(crate) fn write_index(self, index: u32, bytes: &mut Vec<u8>) {
+        bytes.extend_from_slice(&index.to_le_bytes()[..self.size()]);
+    }
+
+    /// Appends a number, as the nearest that the type has.
+    pub(crate) fn write(self, value: f32, bytes: &mut Vec<u8>) {
+        match self {
+            Self::I8 => bytes.extend((value.round() as i8).to_le_bytes()),
+            Self::U8 => bytes.push(value.round() as u8),
+            Self::I16 => bytes.extend((value.round() as i16).to_le_bytes()),
+            Self::U16 => bytes.extend((value.round() as u16).to_le_bytes()),
+            Self::U32 => bytes.extend((value.round() as u32).to_le_bytes()),
+            Self::F32 => bytes.extend(value.to_le_bytes()),
+        }
+    }
+
     #[inline]
     fn read_index(self, bytes: &[u8]) -> u32 {
         match self {
@@ -127,10 +154,17 @@ fn word(bytes: &[u8]) -> u32 {
     u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]])
 }
 
-impl<'a> Source<'a> {
-    /// Looks at an accessor and checks that it lies within its buffer.
-    pub(crate) fn accessor(&self, index: usize) -> Result<Accessor<'a>, LoadError> {
-        let item = self.document.item("accessors", index)?;
+/// How many elements an accessor has, and of what.
+pub(crate) struct Layout {
+    pub(crate) count: u64,
+    pub(crate) component: Component,
+    /// Numbers an element.
+    pub(crate) components: usize,
+}
+
+impl Layout {
+    /// What an accessor says.
+    pub(crate) fn of(item: &At<'_>) -> Result<Self, LoadError> {
         let count = item.whole("count")?.ok_or_else(|| item.error("\"count\" is missing"))?;
         let code = item.whole("componentType")?.ok_or_else(|| item.error("\"componentType\" is missing"))?;
         let component = Component::from_code(code)
@@ -148,11 +182,37 @@ impl<'a> Source<'a> {
         if matches!(shape, "MAT2" | "MAT3") && component.size() < 4 {
             return Err(item.error("padded matrices are not supported; use floats"));
         }
-        let size = components * component.size();
+        Ok(Self { count, component, components })
+    }
+
+    /// Bytes of an element.
+    pub(crate) fn size(&self) -> usize {
+        self.components * self.component.size()
+    }
+}
+
+/// Elements without gaps that a compressed primitive has filled an accessor with.
+pub(crate) struct Filled {
+    pub(crate) bytes: Vec<u8>,
+    pub(crate) count: u64,
+}
+
+impl<'a> Source<'a> {
+    /// Looks at an accessor and checks that it lies within its buffer.
+    pub(crate) fn accessor(&self, index: usize) -> Result<Accessor<'a>, LoadError> {
+        let item = self.document.item("accessors", index)?;
+        let layout = Layout::of(&item)?;
+        let Layout { mut count, component, components } = layout;
+        let size = layout.size();
+        let buffers: &'a Buffers<'a> = self.buffers;
         let dense = match item.index("bufferView", "bufferViews", self.document.count("bufferViews"))? {
             Some(view) => {
                 let offset = item.whole("byteOffset")?.unwrap_or(0);
                 Some(self.strided(&item.pointer, view, offset, size, count)?)
+            }
+            None if let Some(filled) = buffers.filled(index) => {
+                count = filled.count;
+                Some(Strided { bytes: &filled.bytes, stride: size })
             }
             None if count > self.limits.unbacked_elements => {
                 return Err(LoadError::Limit {
@@ -209,7 +269,7 @@ impl<'a> Source<'a> {
 
     fn sparse(
         &self,
-        item: &crate::gltf::document::At<'_>,
+        item: &At<'_>,
         size: usize,
         count: u64,
     ) -> Result<Option<Sparse<'a>>, LoadError> {

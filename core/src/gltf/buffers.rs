@@ -1,9 +1,11 @@
 //! The bytes that accessors and pictures look at.
 
+use crate::gltf::accessor::Filled;
 use crate::gltf::bundle::Bundle;
 use crate::gltf::document::{At, Document};
 use crate::gltf::error::LoadError;
 use crate::gltf::limits::Limits;
+use crate::gltf::meshopt::compressed;
 use crate::gltf::uri::{self, Target};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -14,6 +16,10 @@ pub(crate) struct Buffers<'a> {
     bytes: Vec<Option<Cow<'a, [u8]>>>,
     /// Buffers that are the file of an earlier one, by index.
     same: Vec<usize>,
+    /// What compressed buffer views hold, by index.
+    decoded: BTreeMap<usize, Vec<u8>>,
+    /// What compressed primitives have filled accessors with, by index.
+    filled: BTreeMap<usize, Filled>,
 }
 
 /// A slice of a buffer, and the distance of its elements where the view says one.
@@ -54,7 +60,12 @@ impl<'a> Buffers<'a> {
         mut binary: Option<Cow<'a, [u8]>>,
         limits: &Limits,
     ) -> Result<Self, LoadError> {
-        let mut buffers = Self { bytes: Vec::new(), same: Vec::new() };
+        let mut buffers = Self {
+            bytes: Vec::new(),
+            same: Vec::new(),
+            decoded: BTreeMap::new(),
+            filled: BTreeMap::new(),
+        };
         let items = document.list("buffers")?;
         let mut known: BTreeMap<&str, usize> = BTreeMap::new();
         let mut total = 0_u64;
@@ -76,19 +87,35 @@ impl<'a> Buffers<'a> {
                 return Err(item.error(format!("says {length} bytes, but there are only {have}")));
             }
             total += if same == i { have.unwrap_or(0) as u64 } else { 0 };
-            if total > limits.buffer_bytes {
-                let (file, pointer) = (document.file().to_owned(), item.pointer.clone());
-                let what = "bytes of buffers";
-                return Err(LoadError::Limit {
-                    file,
-                    pointer,
-                    what,
-                    found: total,
-                    limit: limits.buffer_bytes,
-                });
-            }
+            check_total(document, &item.pointer, total, limits)?;
         }
+        buffers.decode(document, total, limits)?;
         Ok(buffers)
+    }
+
+    /// Decodes all compressed buffer views. `total` bytes are there.
+    fn decode(&mut self, document: &Document, mut total: u64, limits: &Limits) -> Result<(), LoadError> {
+        for (i, item) in document.list("bufferViews")?.iter().enumerate() {
+            let Some(view) = compressed(item, self.bytes.len())? else { continue };
+            total = total.saturating_add(view.len());
+            check_total(document, view.pointer(), total, limits)?;
+            let Some(whole) = self.whole(view.buffer) else {
+                let detail = format!("refers to /buffers/{}, which has no data", view.buffer);
+                return Err(document.error(view.pointer(), detail));
+            };
+            self.decoded.insert(i, view.decode(whole)?);
+        }
+        Ok(())
+    }
+
+    /// Notes what compressed primitives have filled accessors with.
+    pub(crate) fn fill(&mut self, filled: BTreeMap<usize, Filled>) {
+        self.filled = filled;
+    }
+
+    /// What a compressed primitive has filled an accessor with.
+    pub(crate) fn filled(&self, accessor: usize) -> Option<&Filled> {
+        self.filled.get(&accessor)
     }
 
     fn whole(&self, index: usize) -> Option<&[u8]> {
@@ -105,6 +132,9 @@ impl<'a> Buffers<'a> {
         if stride.is_some_and(|s| !(4..=252).contains(&s)) {
             return Err(item.error("\"byteStride\" must be 4 to 252"));
         }
+        if let Some(bytes) = self.decoded.get(&index) {
+            return Ok(View { bytes, stride: stride.map(|s| s as usize) });
+        }
         let Some(whole) = self.whole(buffer) else {
             return Err(item
                 .error(format!("refers to /buffers/{buffer}, which has no data: no URI, no binary chunk")));
@@ -118,4 +148,12 @@ impl<'a> Buffers<'a> {
         };
         Ok(View { bytes: &whole[offset as usize..end as usize], stride: stride.map(|s| s as usize) })
     }
+}
+
+fn check_total(document: &Document, pointer: &str, found: u64, limits: &Limits) -> Result<(), LoadError> {
+    if found <= limits.buffer_bytes {
+        return Ok(());
+    }
+    let (file, pointer) = (document.file().to_owned(), pointer.to_owned());
+    Err(LoadError::Limit { file, pointer, what: "bytes of buffers", found, limit: limits.buffer_bytes })
 }

@@ -13,15 +13,21 @@ enum Support {
 
 fn support(name: &str) -> Option<Support> {
     match name {
-        "KHR_lights_punctual"
+        "KHR_draco_mesh_compression"
+        | "KHR_lights_punctual"
+        | "KHR_materials_clearcoat"
         | "KHR_materials_emissive_strength"
         | "KHR_materials_ior"
         | "KHR_materials_pbrSpecularGlossiness"
+        | "KHR_materials_sheen"
         | "KHR_materials_specular"
         | "KHR_materials_transmission"
+        | "KHR_materials_unlit"
         | "KHR_materials_volume"
         | "KHR_mesh_quantization"
+        | "KHR_meshopt_compression"
         | "KHR_texture_transform"
+        | "EXT_meshopt_compression"
         | "EXT_texture_webp" => Some(Support::Full),
         "KHR_materials_variants" => Some(Support::Partly("the default materials are shown, no variant")),
         _ => None,

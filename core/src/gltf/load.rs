@@ -13,7 +13,7 @@ use crate::gltf::nodes::Tree;
 use crate::gltf::report::{Animated, Dropped, Report};
 use crate::gltf::shapes::{Materials, Shape};
 use crate::gltf::textures::TextureTable;
-use crate::gltf::{cameras, extensions, knots, lights, materials, nodes, pictures, shapes, survey};
+use crate::gltf::{cameras, draco, extensions, knots, lights, materials, nodes, pictures, shapes, survey};
 use crate::scene::data::SceneData;
 use crate::scene::material::{Coverage, Material, MaterialId};
 use crate::scene::texture::Texture;
@@ -48,7 +48,9 @@ pub fn load_while(bundle: &Bundle, limits: &Limits, times: [f64; 2]) -> Result<L
     }
     check_version(&document)?;
     extensions::check(&document, &mut problems)?;
-    let buffers = Buffers::read(bundle, &document, parts.binary, limits)?;
+    let mut buffers = Buffers::read(bundle, &document, parts.binary, limits)?;
+    let filled = draco::fill(&document, &buffers, limits, &mut problems)?;
+    buffers.fill(filled);
     let source = Source { document: &document, buffers: &buffers, limits };
 
     let animation = animation::read(source, &mut problems)?;

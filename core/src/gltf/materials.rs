@@ -3,7 +3,9 @@
 use crate::gltf::document::{At, Document};
 use crate::gltf::error::{LoadError, Problems};
 use crate::gltf::textures::{TextureTable, UvSets};
-use crate::scene::material::{Coverage, Material, RoughnessMap, Sides, Textured, Volume};
+use crate::scene::material::{
+    Coverage, LayerMaterial, Material, RoughnessMap, Sides, TextureSlot, Textured, Volume,
+};
 use crate::scene::texture::Encoding;
 use glam::{Vec3, Vec4};
 
@@ -16,6 +18,7 @@ pub(crate) struct Read {
     pub(crate) pointer: String,
 }
 
+const UNLIT: &str = "KHR_materials_unlit";
 const SPECULAR_GLOSSINESS: &str = "KHR_materials_pbrSpecularGlossiness";
 
 /// Collects what a material refers to.
@@ -39,10 +42,16 @@ pub(crate) fn read(
     let item = document.item("materials", index)?;
     let mut reader = Reader { document, table, problems, sets: UvSets::default() };
     let mut material = Material { name: item.name(), ..Material::default() };
+    coverage(&item, &mut material)?;
+    if item.extension(UNLIT)?.is_some() {
+        reader.unlit(&item, &mut material)?;
+        return Ok(Read { material, sets: reader.sets, pointer: item.pointer });
+    }
     reader.core(&item, &mut material)?;
     reader.emission(&item, &mut material)?;
     reader.dielectric(&item, &mut material)?;
     reader.transmission(&item, &mut material)?;
+    reader.layers(&item, &mut material)?;
     Ok(Read { material, sets: reader.sets, pointer: item.pointer })
 }
 
@@ -59,13 +68,25 @@ fn colour(at: &At<'_>, key: &str) -> Result<Option<Vec3>, LoadError> {
     }
 }
 
+/// Which sides emit, and what is seen through it.
+fn coverage(item: &At<'_>, material: &mut Material) -> Result<(), LoadError> {
+    material.sides = if item.flag("doubleSided")?.unwrap_or(false) { Sides::Both } else { Sides::Front };
+    material.coverage = match item.text("alphaMode")? {
+        None | Some("OPAQUE") => Coverage::Opaque,
+        Some("BLEND") => Coverage::Blend,
+        Some("MASK") => Coverage::Mask { cutoff: item.number("alphaCutoff")?.unwrap_or(0.5) as f32 },
+        Some(_) => return Err(item.error("\"alphaMode\" must be OPAQUE, MASK or BLEND")),
+    };
+    Ok(())
+}
+
 impl Reader<'_> {
     fn slot(
         &mut self,
         at: &At<'_>,
         key: &str,
         encoding: Encoding,
-    ) -> Result<Option<crate::scene::material::TextureSlot>, LoadError> {
+    ) -> Result<Option<TextureSlot>, LoadError> {
         self.table.slot(self.document, at, key, encoding, &mut self.sets, self.problems)
     }
 
@@ -73,10 +94,7 @@ impl Reader<'_> {
         if let Some(extension) = item.extension(SPECULAR_GLOSSINESS)? {
             self.specular_glossiness(&extension, material)?;
         } else if let Some(pbr) = item.object("pbrMetallicRoughness")? {
-            if let Some(factor) = pbr.numbers::<4>("baseColorFactor")? {
-                material.base_color.factor = Vec4::from(factor.map(|v| v.clamp(0.0, 1.0) as f32));
-            }
-            material.base_color.texture = self.slot(&pbr, "baseColorTexture", Encoding::Srgb)?;
+            self.base(&pbr, material)?;
             material.metallic = pbr.share("metallicFactor")?.unwrap_or(1.0);
             material.roughness = pbr.share("roughnessFactor")?.unwrap_or(1.0);
             if material.metallic > 0.0 || material.roughness > 0.0 {
@@ -84,20 +102,28 @@ impl Reader<'_> {
                 material.roughness_map = slot.map(RoughnessMap::MetallicRoughness);
             }
         }
-        if let Some(info) = item.object("normalTexture")? {
-            let scale = info.number("scale")?.unwrap_or(1.0) as f32;
-            if scale != 0.0 && scale.is_finite() {
-                material.normal =
-                    self.slot(item, "normalTexture", Encoding::Linear)?.map(|slot| (slot, scale));
-            }
+        material.normal = self.normal_map(item, "normalTexture")?;
+        Ok(())
+    }
+
+    fn base(&mut self, pbr: &At<'_>, material: &mut Material) -> Result<(), LoadError> {
+        if let Some(factor) = pbr.numbers::<4>("baseColorFactor")? {
+            material.base_color.factor = Vec4::from(factor.map(|v| v.clamp(0.0, 1.0) as f32));
         }
-        material.sides = if item.flag("doubleSided")?.unwrap_or(false) { Sides::Both } else { Sides::Front };
-        material.coverage = match item.text("alphaMode")? {
-            None | Some("OPAQUE") => Coverage::Opaque,
-            Some("BLEND") => Coverage::Blend,
-            Some("MASK") => Coverage::Mask { cutoff: item.number("alphaCutoff")?.unwrap_or(0.5) as f32 },
-            Some(_) => return Err(item.error("\"alphaMode\" must be OPAQUE, MASK or BLEND")),
-        };
+        material.base_color.texture = self.slot(pbr, "baseColorTexture", Encoding::Srgb)?;
+        Ok(())
+    }
+
+    /// Black to light, its colour for the eye only.
+    fn unlit(&mut self, item: &At<'_>, material: &mut Material) -> Result<(), LoadError> {
+        if let Some(pbr) = item.object("pbrMetallicRoughness")? {
+            self.base(&pbr, material)?;
+        }
+        let shown = material.base_color.factor;
+        material.unlit = Some(shown.truncate());
+        material.base_color.factor = Vec4::new(0.0, 0.0, 0.0, shown.w);
+        material.metallic = 0.0;
+        material.specular.factor = 0.0;
         Ok(())
     }
 
@@ -155,6 +181,47 @@ impl Reader<'_> {
             }
         }
         Ok(())
+    }
+
+    fn layers(&mut self, item: &At<'_>, material: &mut Material) -> Result<(), LoadError> {
+        let mut layers = LayerMaterial::NONE;
+        if let Some(coat) = item.extension("KHR_materials_clearcoat")? {
+            layers.coat.factor = coat.share("clearcoatFactor")?.unwrap_or(0.0);
+            if layers.coat.factor > 0.0 {
+                layers.coat.texture = self.slot(&coat, "clearcoatTexture", Encoding::Linear)?;
+                layers.coat_roughness.factor = coat.share("clearcoatRoughnessFactor")?.unwrap_or(0.0);
+                if layers.coat_roughness.factor > 0.0 {
+                    let slot = self.slot(&coat, "clearcoatRoughnessTexture", Encoding::Linear)?;
+                    layers.coat_roughness.texture = slot;
+                }
+                layers.coat_normal = self.normal_map(&coat, "clearcoatNormalTexture")?;
+            }
+        }
+        if let Some(sheen) = item.extension("KHR_materials_sheen")? {
+            layers.sheen.factor = colour(&sheen, "sheenColorFactor")?.unwrap_or(Vec3::ZERO).min(Vec3::ONE);
+            if layers.sheen.factor != Vec3::ZERO {
+                layers.sheen.texture = self.slot(&sheen, "sheenColorTexture", Encoding::Srgb)?;
+                layers.sheen_roughness.factor = sheen.share("sheenRoughnessFactor")?.unwrap_or(0.0);
+                let slot = self.slot(&sheen, "sheenRoughnessTexture", Encoding::Linear)?;
+                layers.sheen_roughness.texture = slot;
+            }
+        }
+        if layers != LayerMaterial::NONE {
+            material.layers = Some(Box::new(layers));
+        }
+        Ok(())
+    }
+
+    /// A normal map and its scale, unless that flattens it.
+    fn normal_map(&mut self, at: &At<'_>, key: &str) -> Result<Option<(TextureSlot, f32)>, LoadError> {
+        let Some(info) = at.object(key)? else {
+            return Ok(None);
+        };
+        let scale = info.number("scale")?.unwrap_or(1.0) as f32;
+        if scale == 0.0 || !scale.is_finite() {
+            return Ok(None);
+        }
+        Ok(self.slot(at, key, Encoding::Linear)?.map(|slot| (slot, scale)))
     }
 
     fn transmission(&mut self, item: &At<'_>, material: &mut Material) -> Result<(), LoadError> {

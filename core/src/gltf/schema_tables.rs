@@ -130,11 +130,14 @@ static MATERIAL: Schema = Schema {
         free("doubleSided", Flag),
     ],
     extensions: &[
+        ("KHR_materials_clearcoat", &CLEARCOAT),
         ("KHR_materials_emissive_strength", &EMISSIVE_STRENGTH),
         ("KHR_materials_ior", &IOR),
         ("KHR_materials_pbrSpecularGlossiness", &SPECULAR_GLOSSINESS),
+        ("KHR_materials_sheen", &SHEEN),
         ("KHR_materials_specular", &SPECULAR),
         ("KHR_materials_transmission", &TRANSMISSION),
+        ("KHR_materials_unlit", &UNLIT),
         ("KHR_materials_volume", &VOLUME),
     ],
 };
@@ -145,6 +148,21 @@ static PBR: Schema = plain(&[
     free("metallicFactor", UNIT),
     free("roughnessFactor", UNIT),
     free("metallicRoughnessTexture", Object(&TEXTURE_INFO)),
+]);
+
+static CLEARCOAT: Schema = plain(&[
+    free("clearcoatFactor", UNIT),
+    free("clearcoatTexture", Object(&TEXTURE_INFO)),
+    free("clearcoatRoughnessFactor", UNIT),
+    free("clearcoatRoughnessTexture", Object(&TEXTURE_INFO)),
+    free("clearcoatNormalTexture", Object(&NORMAL_TEXTURE)),
+]);
+
+static SHEEN: Schema = plain(&[
+    free("sheenColorFactor", COLOUR),
+    free("sheenColorTexture", Object(&TEXTURE_INFO)),
+    free("sheenRoughnessFactor", UNIT),
+    free("sheenRoughnessTexture", Object(&TEXTURE_INFO)),
 ]);
 
 static EMISSIVE_STRENGTH: Schema = plain(&[free("emissiveStrength", Number(0.0, MOST))]);
@@ -165,6 +183,8 @@ static SPECULAR_GLOSSINESS: Schema = plain(&[
     free("glossinessFactor", UNIT),
     free("specularGlossinessTexture", Object(&TEXTURE_INFO)),
 ]);
+
+static UNLIT: Schema = plain(&[]);
 
 static TRANSMISSION: Schema =
     plain(&[free("transmissionFactor", UNIT), free("transmissionTexture", Object(&TEXTURE_INFO))]);

@@ -171,7 +171,8 @@ fn wanted(read: &materials::Read, shape: &Shape) -> Wanted {
         let list = slot.set as usize;
         sets.0[list] = read.sets.0[list];
     }
-    let normal_map = material.normal.map(|(slot, _)| slot.set as usize);
+    let coat = material.layers.as_ref().and_then(|layers| layers.coat_normal);
+    let normal_map = material.normal.or(coat).map(|(slot, _)| slot.set as usize);
     let influences = if shape.skin.is_some() { skin::Wanted::Yes } else { skin::Wanted::No };
     Wanted { sets, normal_map, influences, morphs: shape.morphs }
 }

@@ -53,6 +53,9 @@ pub fn sample(
     let at = scene.data.interaction(hit.instance, hit.triangle, hit.barycentric, Moment::STILL);
     let back = -ray.direction;
     let side = at.side(back);
+    if let Some(shown) = scene.unlit_on(&ray, &at) {
+        return shown;
+    }
     let emission = if at.material.emits() { at.emission(side) } else { Rgb::ZERO };
     let wo = at.shading.to_local(back);
     let sign = if side == Side::Front { 1.0 } else { -1.0 };

@@ -47,6 +47,8 @@ pub struct Walk<'a, S: State, T: Throughput<S>> {
     pub media: Media,
     /// Scatterings so far.
     pub scatterings: u32,
+    /// Whether all of them were ideally specular.
+    pub sight: Sight,
     /// Its vertices so far, where weights are computed from all of them.
     pub links: Vec<Link>,
     transport: Transport,
@@ -55,6 +57,15 @@ pub struct Walk<'a, S: State, T: Throughput<S>> {
     /// One over the throughput it began with.
     scale: f32,
     state: PhantomData<S>,
+}
+
+/// Whether a walk goes as one looks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sight {
+    /// Straight, or by ideally specular lobes only.
+    Clear,
+    /// A smooth lobe has scattered it.
+    Scattered,
 }
 
 /// The edge that a walk is on.
@@ -129,6 +140,7 @@ impl<'a, S: State, T: Throughput<S>> Walk<'a, S, T> {
             partial,
             media: Media::VACUUM,
             scatterings: 0,
+            sight: Sight::Clear,
             links: Vec::new(),
             transport,
             eta_squared: 1.0,
@@ -237,6 +249,9 @@ impl<'a, S: State, T: Throughput<S>> Walk<'a, S, T> {
             Transport::Importance => 1.0,
         };
         self.scatterings += 1;
+        if density != Density::Delta {
+            self.sight = Sight::Scattered;
+        }
         if self.scatterings >= ROULETTE_FROM && !self.survives(choice.y) {
             return false;
         }

@@ -62,6 +62,7 @@ mod tests {
             ior: 1.5,
             transmission: 0.0,
             walls: Walls::Thin,
+            layers: None,
         }
     }
 

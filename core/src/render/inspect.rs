@@ -96,6 +96,9 @@ fn letters(material: &Material) -> Letters {
     let textured_metal = matches!(material.roughness_map, Some(RoughnessMap::MetallicRoughness(_)));
     let choices = |factor: f32, textured: bool| [factor, if textured { 0.0 } else { factor }];
     let mut letters = Letters::NONE;
+    if material.unlit.is_some() {
+        return letters;
+    }
     for metallic in choices(material.metallic, textured_metal) {
         for transmission in choices(material.transmission.factor, material.transmission.texture.is_some()) {
             for specular in choices(material.specular.factor, material.specular.texture.is_some()) {
@@ -108,8 +111,13 @@ fn letters(material: &Material) -> Letters {
                     ior: material.ior,
                     transmission,
                     walls: material.walls(),
+                    layers: None,
                 };
                 letters = letters.union(Bsdf::from_surface(&surface).letters());
+                if let Some(layers) = &material.layers {
+                    let layers = Some(layers.without_textures());
+                    letters = letters.union(Bsdf::from_surface(&SurfaceParameters { layers, ..surface }).letters());
+                }
             }
         }
     }
@@ -117,7 +125,7 @@ fn letters(material: &Material) -> Letters {
 }
 
 /// Each feature that a scene may need, and whether this one does.
-fn features(report: &Report, data: &SceneData) -> [(&'static str, bool); 14] {
+fn features(report: &Report, data: &SceneData) -> [(&'static str, bool); 15] {
     let any = |of: fn(&Material) -> bool| data.materials.iter().any(of);
     [
         ("triangles", data.meshes.iter().any(|m| !m.triangles.is_empty())),
@@ -129,6 +137,7 @@ fn features(report: &Report, data: &SceneData) -> [(&'static str, bool); 14] {
         ("transmission", any(|m| m.transmission.factor > 0.0)),
         ("volumes", any(|m| m.volume.is_some())),
         ("emissive surfaces", any(Material::emits)),
+        ("unlit surfaces", any(|m| m.unlit.is_some())),
         ("punctual lights", !data.punctual.is_empty()),
         (DEFAULT_SKY, !is_lit(data)),
         ("animation", report.animated.nodes > 0),

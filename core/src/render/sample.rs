@@ -8,7 +8,7 @@ use crate::path::tally::Tally;
 use crate::path::throughput::Carriage;
 use crate::radiosity::solution::Solution;
 use crate::sampler::{Dimension, Sampler};
-use crate::scene::Scene;
+use crate::scene::{Scene, Unlit};
 use crate::settings::{Method, Settings};
 use crate::trace::moment::Moment;
 use crate::trace::ray::Ray;
@@ -36,6 +36,10 @@ impl Sampling<'_> {
             Method::Light => {
                 let moment = self.moment(&self.pixel(pixel, index));
                 light::sample::<C>(scene, rules, (&self.light(pixel, index), moment), tally);
+                if scene.unlit() == Unlit::Some {
+                    let (eye, ray) = self.eye(pixel, index);
+                    light::unlit::<C>(scene, rules, (&eye, ray), tally);
+                }
             }
             Method::Bidirectional => {
                 let (eye, ray) = self.eye(pixel, index);

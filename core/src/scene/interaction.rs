@@ -1,11 +1,11 @@
 //! A point on a surface, ready to be shaded.
 
-use crate::bsdf::surface::SurfaceParameters;
+use crate::bsdf::surface::{Layers, SurfaceParameters};
 use crate::math::colour::Rgb;
 use crate::math::frame::Frame;
 use crate::scene::data::SceneData;
 use crate::scene::instance::{Handedness, Motion, Placement};
-use crate::scene::material::{Material, Sides, SurfaceCoordinates};
+use crate::scene::material::{LayerMaterial, Material, Sides, SurfaceCoordinates};
 use crate::scene::mesh::Mesh;
 use crate::scene::texture::Texture;
 use crate::trace::moment::Moment;
@@ -30,6 +30,8 @@ pub struct Interaction<'a> {
     pub ng: Vec3,
     /// Shading frame; its `z` is the interpolated and mapped normal, on the front side too.
     pub shading: Frame,
+    /// Unit normal of its coat, on the front side; that of `shading` where there is none.
+    pub coat: Vec3,
     /// Where on its textures.
     pub at: SurfaceCoordinates,
     /// When.
@@ -122,7 +124,13 @@ impl SceneData {
             }
             Normals::Geometric => Frame::around(ng),
         };
-        Interaction { position, ng, shading, at, moment, material, textures: &self.textures, point: on }
+        let coat = match (&material.layers, normals) {
+            (Some(_), Normals::Interpolated) => {
+                shading_frame(point, placement, ng, || material.mapped_coat_normal(&self.textures, &at)).z
+            }
+            _ => shading.z,
+        };
+        Interaction { position, ng, shading, coat, at, moment, material, textures: &self.textures, point: on }
     }
 }
 
@@ -235,9 +243,22 @@ impl Interaction<'_> {
         }
     }
 
+    /// What the eye sees where the surface is unlit.
+    pub fn shown(&self) -> Option<Rgb> {
+        self.material.shown(self.textures, &self.at)
+    }
+
     /// Share of what is behind that the surface covers.
     pub fn alpha(&self) -> f32 {
         self.material.alpha(self.textures, &self.at)
+    }
+
+    /// A coat whose normal the shading normal turns away from goes by that one.
+    #[inline(never)]
+    fn layers(&self, layers: &LayerMaterial) -> Layers {
+        let normal = self.shading.to_local(self.coat);
+        let normal = if normal.z > 0.0 { normal.normalize() } else { Vec3::Z };
+        layers.at(self.textures, &self.at, normal)
     }
 
     /// What the surface is made of here.
@@ -254,6 +275,7 @@ impl Interaction<'_> {
             ior: material.ior,
             transmission: material.transmitted(textures, at),
             walls: material.walls(),
+            layers: material.layers.as_ref().map(|layers| self.layers(layers)),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! What surfaces are made of.
 
-use crate::bsdf::surface::Walls;
+use crate::bsdf::surface::{Layers, Walls};
 use crate::math::colour::Rgb;
 use crate::scene::texture::{Texture, TextureId};
 use glam::{Affine2, Vec2, Vec3, Vec4};
@@ -95,6 +95,9 @@ pub struct Material {
     pub normal: Option<(TextureSlot, f32)>,
     /// Radiance, W/(sr·m²) a channel.
     pub emission: Textured<Rgb>,
+    /// Base colour of an unlit surface, whose other colours are black: the eye sees it as radiance, on both sides, straight
+    /// or by ideally specular lobes. It lights nothing.
+    pub unlit: Option<Rgb>,
     /// Which sides emit.
     pub sides: Sides,
     /// Strength of the dielectric reflection; its texture's alpha.
@@ -107,9 +110,72 @@ pub struct Material {
     pub transmission: Textured<f32>,
     /// What it encloses; `None` for thin walls.
     pub volume: Option<Volume>,
+    /// What lies on it.
+    pub layers: Option<Box<LayerMaterial>>,
     /// How it covers what is behind it.
     pub coverage: Coverage,
 }
+
+/// A clear coat over cloth.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LayerMaterial {
+    /// Share of the surface that is coated; its texture's red.
+    pub coat: Textured<f32>,
+    /// Perceptual roughness of the coat; its texture's green.
+    pub coat_roughness: Textured<f32>,
+    /// A normal map of the coat and the scale of its x and y.
+    pub coat_normal: Option<(TextureSlot, f32)>,
+    /// Colour of the fibres.
+    pub sheen: Textured<Rgb>,
+    /// Perceptual roughness of the fibres; its texture's alpha.
+    pub sheen_roughness: Textured<f32>,
+}
+
+impl LayerMaterial {
+    /// No layers.
+    pub const NONE: Self = Self {
+        coat: Textured::constant(0.0),
+        coat_roughness: Textured::constant(0.0),
+        coat_normal: None,
+        sheen: Textured::constant(Vec3::ZERO),
+        sheen_roughness: Textured::constant(0.0),
+    };
+
+    /// All texture slots.
+    fn slots(&self) -> [Option<&TextureSlot>; 5] {
+        [
+            self.coat.texture.as_ref(),
+            self.coat_roughness.texture.as_ref(),
+            self.coat_normal.as_ref().map(|(slot, _)| slot),
+            self.sheen.texture.as_ref(),
+            self.sheen_roughness.texture.as_ref(),
+        ]
+    }
+
+    /// The layers by their factors alone.
+    pub fn without_textures(&self) -> Layers {
+        Layers {
+            coat: self.coat.factor,
+            coat_roughness: self.coat_roughness.factor,
+            coat_normal: Vec3::Z,
+            sheen: self.sheen.factor,
+            sheen_roughness: self.sheen_roughness.factor,
+        }
+    }
+
+    /// The layers at a point, for the coat's normal in the shading frame.
+    pub fn at(&self, textures: &[Texture], at: &SurfaceCoordinates, coat_normal: Vec3) -> Layers {
+        let texel = |slot: Option<TextureSlot>| slot.map_or(Vec4::ONE, |slot| slot.sample(textures, at));
+        Layers {
+            coat: self.coat.factor * texel(self.coat.texture).x,
+            coat_roughness: self.coat_roughness.factor * texel(self.coat_roughness.texture).y,
+            coat_normal,
+            sheen: self.sheen.factor * texel(self.sheen.texture).truncate(),
+            sheen_roughness: self.sheen_roughness.factor * texel(self.sheen_roughness.texture).w,
+        }
+    }
+}
+
 
 /// A texture that varies how rough a surface is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -147,12 +213,14 @@ impl Default for Material {
             roughness_map: None,
             normal: None,
             emission: Textured::constant(Vec3::ZERO),
+            unlit: None,
             sides: Sides::Front,
             specular: Textured::constant(1.0),
             specular_color: Textured::constant(Vec3::ONE),
             ior: 1.5,
             transmission: Textured::constant(0.0),
             volume: None,
+            layers: None,
             coverage: Coverage::Opaque,
         }
     }
@@ -199,6 +267,7 @@ impl Material {
             self.transmission.texture.as_ref(),
         ]
         .into_iter()
+        .chain(self.layers.iter().flat_map(|layers| layers.slots()))
         .flatten()
     }
 
@@ -225,6 +294,12 @@ impl Material {
             }
             _ => self.emission.factor,
         }
+    }
+
+    /// What the eye sees of it where it is unlit.
+    pub fn shown(&self, textures: &[Texture], at: &SurfaceCoordinates) -> Option<Rgb> {
+        let texel = || self.base_color.texture.map_or(Vec4::ONE, |slot| slot.sample(textures, at));
+        self.unlit.map(|factor| factor * (at.colour * texel()).truncate().max(Vec3::ZERO))
     }
 
     /// Roughness and metallic.
@@ -258,8 +333,16 @@ impl Material {
 
     /// The normal that the map says, in the frame of tangent, bitangent and normal; not of unit length.
     pub fn mapped_normal(&self, textures: &[Texture], at: &SurfaceCoordinates) -> Option<Vec3> {
-        let (slot, scale) = self.normal?;
-        let n = slot.sample(textures, at).truncate() * 2.0 - Vec3::ONE;
-        Some(Vec3::new(n.x * scale, n.y * scale, n.z))
+        self.normal.map(|map| mapped(map, textures, at))
     }
+
+    /// The same of its coat.
+    pub fn mapped_coat_normal(&self, textures: &[Texture], at: &SurfaceCoordinates) -> Option<Vec3> {
+        self.layers.as_ref()?.coat_normal.map(|map| mapped(map, textures, at))
+    }
+}
+
+fn mapped((slot, scale): (TextureSlot, f32), textures: &[Texture], at: &SurfaceCoordinates) -> Vec3 {
+    let n = slot.sample(textures, at).truncate() * 2.0 - Vec3::ONE;
+    Vec3::new(n.x * scale, n.y * scale, n.z)
 }

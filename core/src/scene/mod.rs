@@ -19,11 +19,13 @@ pub mod punctual;
 pub mod texture;
 pub mod view;
 
+use crate::math::colour::Rgb;
 use crate::sampler::decide;
 use crate::scene::data::SceneData;
 use crate::scene::environment::Environment;
+use crate::scene::interaction::{Interaction, Side};
 use crate::scene::lights::Lights;
-use crate::scene::material::Coverage;
+use crate::scene::material::{Coverage, Sides};
 use crate::scene::mesh::Mesh;
 use crate::scene::view::{View, Views};
 use crate::trace::aggregate::Aggregate;
@@ -45,13 +47,27 @@ pub struct Scene {
     views: Views,
     aggregate: Aggregate,
     coverage: SceneCoverage,
+    unlit: Unlit,
 }
+
+/// Surfaces lie back to back within this many error bounds of their points: those of both, along rays that meet them at
+/// angles of up to 86°.
+const BACK_TO_BACK: f32 = 32.0;
 
 /// Whether anything in a scene can be looked through.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum SceneCoverage {
     Opaque,
     Partly,
+}
+
+/// Whether a scene has unlit surfaces.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unlit {
+    /// Some.
+    Some,
+    /// None.
+    None,
 }
 
 impl Scene {
@@ -64,8 +80,10 @@ impl Scene {
         let aggregate = Aggregate::moving(trees, &placements, |i| data.instances[i].placement.knots())?;
         let opaque = data.materials.iter().all(|m| m.coverage == Coverage::Opaque);
         let coverage = if opaque { SceneCoverage::Opaque } else { SceneCoverage::Partly };
+        let unlit = data.materials.iter().any(|m| m.unlit.is_some());
+        let unlit = if unlit { Unlit::Some } else { Unlit::None };
         let lights = Lights::new(&data, environment.as_ref());
-        Ok(Self { data, environment, lights, views, aggregate, coverage })
+        Ok(Self { data, environment, lights, views, aggregate, coverage, unlit })
     }
 
     /// When a sample is taken: at the share of the shutter's time that `share` tells, which is not asked where nothing
@@ -92,6 +110,34 @@ impl Scene {
         self.aggregate.closest(ray, |hit| {
             let alpha = self.data.alpha(hit.instance, hit.triangle, hit.barycentric);
             alpha >= 1.0 || decide(key, u64::from(hit.instance) << 32 | u64::from(hit.triangle)) < alpha
+        })
+    }
+
+    /// Whether it has unlit surfaces.
+    #[inline]
+    pub fn unlit(&self) -> Unlit {
+        self.unlit
+    }
+
+    /// What is seen of the unlit surface that a ray met at a point. Where two lie back to back, as in baked scenes, each
+    /// shows on its own side, whichever was met.
+    pub fn unlit_on(&self, ray: &Ray, at: &Interaction<'_>) -> Option<Rgb> {
+        let own = at.shown()?;
+        if at.side(-ray.direction) == Side::Front || at.material.sides == Sides::Both {
+            return Some(own);
+        }
+        let (distance, bound) = ((at.position - ray.origin).dot(ray.direction), BACK_TO_BACK * at.error());
+        let fronts = |hit: &Hit| {
+            let there = self.data.interaction(hit.instance, hit.triangle, hit.barycentric, ray.moment);
+            hit.t >= distance - bound
+                && there.material.unlit.is_some()
+                && there.side(-ray.direction) == Side::Front
+                && there.alpha() > 0.0
+        };
+        let until = Ray { t_max: distance + bound, ..*ray };
+        let twin = self.aggregate.closest(&until, fronts);
+        twin.map_or(Some(own), |twin| {
+            self.data.interaction(twin.instance, twin.triangle, twin.barycentric, ray.moment).shown()
         })
     }
 

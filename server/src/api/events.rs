@@ -18,7 +18,14 @@ use ovtigre_proto::{
     id::JobId,
     status::{JobEvent, JobStatus},
 };
-use std::{collections::VecDeque, convert::Infallible, fmt, str::FromStr, sync::Arc, time::Duration};
+use std::{
+    collections::VecDeque,
+    convert::Infallible,
+    fmt,
+    str::FromStr,
+    sync::Arc,
+    time::{Duration, Instant},
+};
 use tokio::sync::watch;
 
 /// Shortest time between two events of a job's status.
@@ -85,16 +92,20 @@ struct Watching {
     /// Whether the client knows the status that `seen` names.
     knows: Option<Seen>,
     events: VecDeque<Event>,
+    /// When it was looked at last.
+    looked: Instant,
 }
 
 impl Watching {
     fn new(farm: Arc<Farm>, id: JobId, last: Option<Seen>) -> Self {
         let changes = farm.live(&id).map(|live| live.changes.subscribe());
-        Self { farm, id, changes, seen: last.unwrap_or_default(), knows: last, events: VecDeque::new() }
+        let seen = last.unwrap_or_default();
+        Self { farm, id, changes, seen, knows: last, events: VecDeque::new(), looked: Instant::now() }
     }
 
     /// Takes up what is new.
     async fn look(&mut self) -> std::result::Result<(), FarmError> {
+        self.looked = Instant::now();
         if let Some(changes) = &mut self.changes {
             changes.mark_unchanged();
         }
@@ -109,6 +120,16 @@ impl Watching {
         }
         self.tell(status);
         Ok(())
+    }
+
+    /// Lets changes gather for a while; the end of a job is not kept from whoever waits for it.
+    async fn pace(&mut self) {
+        while let Some(changes) = &mut self.changes
+            && self.farm.live(&self.id).is_some()
+            && let Some(rest) = PACE.checked_sub(self.looked.elapsed())
+        {
+            tokio::time::timeout(rest, changes.changed()).await.ok();
+        }
     }
 
     fn tell(&mut self, status: JobStatus) {
@@ -143,9 +164,7 @@ fn events(watching: Watching) -> impl Stream<Item = std::result::Result<Event, I
                     }
                 }
             }
-            if watching.changes.is_some() {
-                tokio::time::sleep(PACE).await;
-            }
+            watching.pace().await;
             if watching.farm.live(&watching.id).is_none() {
                 watching.changes = None;
             }

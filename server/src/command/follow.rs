@@ -22,6 +22,13 @@ pub(crate) enum Workers<'a> {
 }
 
 impl Workers<'_> {
+    /// There is nothing more to do for them: ours leave.
+    pub(crate) fn dismiss(&self) {
+        if let Self::Ours(workers) = self {
+            workers.dismiss();
+        }
+    }
+
     /// Returns, with the reason, if none of ours is left.
     async fn lost(&self) -> String {
         match self {
@@ -38,7 +45,7 @@ pub(crate) async fn until_over(
     job: &JobId,
     progress: &mut Progress,
     interrupt: &Interrupt,
-    workers: Workers<'_>,
+    workers: &Workers<'_>,
 ) -> Outcome<JobStatus> {
     let mut events = client.events(job);
     let mut last = None;

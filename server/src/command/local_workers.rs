@@ -99,9 +99,14 @@ impl LocalWorkers {
         }
     }
 
-    /// Lets them hand back what they hold, and ends them.
-    pub(crate) async fn stop(mut self) {
+    /// Tells them to hand back what they hold and to leave.
+    pub(crate) fn dismiss(&self) {
         self.stop.cancel();
+    }
+
+    /// Dismisses them, and returns when they are gone.
+    pub(crate) async fn stop(mut self) {
+        self.dismiss();
         while self.watchers.join_next().await.is_some() {}
     }
 }

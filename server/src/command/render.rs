@@ -81,8 +81,9 @@ async fn carry_out(
     };
     let mut progress = Progress::new(others);
     progress.show(&job);
-    let status = until_over(&client, &job.id, &mut progress, interrupt, workers).await?;
+    let status = until_over(&client, &job.id, &mut progress, interrupt, &workers).await?;
     drop(progress);
+    workers.dismiss();
     tokio::select! {
         collected = submission.collect(&client, &status) => collected,
         () = interrupt.twice() => Err(CommandError::stopped("left before the picture was written")),

@@ -45,7 +45,7 @@ impl Submit {
         let interrupt = Interrupt::listen();
         let mut progress = Progress::new(Others::None);
         progress.show(&job);
-        let status = until_over(&client, &job.id, &mut progress, &interrupt, Workers::Theirs).await?;
+        let status = until_over(&client, &job.id, &mut progress, &interrupt, &Workers::Theirs).await?;
         drop(progress);
         submission.collect(&client, &status).await
     }

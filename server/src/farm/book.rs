@@ -16,6 +16,7 @@ use std::{
     sync::Arc,
     time::Instant,
 };
+use tokio::sync::Notify;
 
 /// Batches of one job of weight 1 before its turn is over.
 const TURN: u64 = 4;
@@ -123,6 +124,7 @@ pub struct Asker<'a> {
 pub struct Book {
     jobs: BTreeMap<JobId, Entry>,
     leases: HashMap<LeaseId, Holding>,
+    more: Arc<Notify>,
     /// Batches that are rendered again to compare.
     pub audits: Audits,
 }
@@ -133,6 +135,12 @@ impl Book {
         let level = self.jobs.values().map(|e| e.served / u64::from(e.wants.weight)).min().unwrap_or(0);
         entry.served = level * u64::from(entry.wants.weight);
         self.jobs.insert(id, entry);
+        self.more.notify_waiters();
+    }
+
+    /// Notified when there may be more to hand out than before.
+    pub fn more(&self) -> Arc<Notify> {
+        Arc::clone(&self.more)
     }
 
     /// A job that is over, and its leases.
@@ -156,6 +164,7 @@ impl Book {
     pub fn reach(&mut self, id: &JobId, checkpoints: u32) {
         if let Some(entry) = self.jobs.get_mut(id) {
             entry.plan.reach(checkpoints);
+            self.more.notify_waiters();
         }
     }
 
@@ -218,6 +227,7 @@ impl Book {
     pub fn put_back(&mut self, job: &JobId, batch: BatchKey) {
         if let Some(entry) = self.jobs.get_mut(job) {
             entry.plan.put_back(batch);
+            self.more.notify_waiters();
         }
     }
 

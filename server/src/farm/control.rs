@@ -69,6 +69,7 @@ impl Farm {
             entry.priority = row.priority;
             entry.hand_out = if row.state == JobState::Paused { HandOut::Paused } else { HandOut::Yes };
         }
+        book.more().notify_waiters();
         drop(book);
         if let Some(live) = self.live(&row.id) {
             live.changed();

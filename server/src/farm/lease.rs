@@ -13,22 +13,39 @@ use ovtigre_proto::{
     lease::{Exchange, ExchangeReply, FailureKind, Lease, LeaseFailure, WorkerJoin},
     status::WorkerState,
 };
-use std::{sync::Arc, time::Instant};
+use std::{
+    pin::pin,
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 impl Farm {
-    /// A worker's beat: renews what it holds, tells what to drop, hands out what it wants.
+    /// A worker's beat: renews what it holds, tells what to drop, hands out what it wants. A worker that
+    /// holds nothing is answered when there is something for it, or else at the time of its next beat.
     pub async fn exchange(&self, worker: &WorkerId, said: Exchange) -> Result<ExchangeReply> {
         let (state, join) = self.hear(worker, &said).await?;
         let drop = self.renew(worker, &said).await?;
-        let leases = match state {
-            WorkerState::Active if !said.leaving && !self.is_full() && !self.crew().rests(worker) => {
-                self.hand_out(worker, &join, &said).await?
+        let more = self.book().more();
+        let mut more = pin!(more.notified());
+        more.as_mut().enable();
+        let mut interval = self.interval();
+        let mut leases = Vec::new();
+        let serves = state == WorkerState::Active && !said.leaving && !self.crew().rests(worker);
+        if serves && !self.is_full() {
+            leases = self.hand_out(worker, &join, &said).await?;
+            let idle = said.wants > 0 && said.holding.is_empty() && drop.is_empty();
+            if leases.is_empty() && idle {
+                tokio::select! {
+                    () = more => {}
+                    () = self.stopping.cancelled() => {}
+                    () = tokio::time::sleep(Duration::from_secs_f64(interval)) => interval = 0.0,
+                }
+                leases = self.hand_out(worker, &join, &said).await?;
             }
-            _ => Vec::new(),
-        };
+        }
         // One that is put aside stays where people see it, and does not come back under a new name.
         let drain = !matches!(state, WorkerState::Active | WorkerState::Aside);
-        Ok(ExchangeReply { leases, drop, interval_seconds: self.interval(), drain })
+        Ok(ExchangeReply { leases, drop, interval_seconds: interval, drain })
     }
 
     /// Seconds between beats: short while there are few workers.

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::bsdf::event::{SampleKind, Transport};
+use crate::bsdf::surface::Layers;
 
 /// Σ f |cos| / p over a rank-1 lattice; flux, so without the factor of radiance in refraction.
 pub(super) fn albedo(bsdf: &Bsdf, wo: Vec3, points: u32) -> Rgb {
@@ -77,6 +78,46 @@ fn no_surface_gains_energy() {
         let found = albedo(&bsdf, wo, 1 << 12).max_element();
         // Two lobes are drawn in proportion to luminance: the worst channel's error is about 1 %.
         assert!(found < 1.0 + 1e-2, "{found} towards {wo} of {surface:?}");
+    }
+}
+
+#[test]
+fn no_layers_gain_energy() {
+    let mut uniform = Uniform(6);
+    for _ in 0..400 {
+        let surface = uniform.layered();
+        let bsdf = Bsdf::from_surface(&surface);
+        let wo = uniform.direction();
+        let found = albedo(&bsdf, wo, 1 << 12).max_element();
+        // As above; cloth is drawn uniformly, which adds as much again.
+        assert!(found < 1.0 + 2e-2, "{found} towards {wo} of {surface:?}");
+    }
+}
+
+/// A coat over a white base returns 1 − c² F (1 − F̄) at most, cloth the colour's albedo and what passes beside it.
+#[test]
+fn layers_reflect_what_they_take() {
+    for (base, alpha) in [(PLASTIC, 0.3), (METAL, 0.3), (METAL, 0.0), (LAMBERT, 0.5)] {
+        for (coat, sheen) in [(1.0, 0.0), (0.4, 0.0), (0.0, 1.0), (0.0, 0.5), (1.0, 0.7)] {
+            for roughness in [0.0, 0.4, 1.0_f32] {
+                let layers = Layers {
+                    coat,
+                    coat_roughness: roughness,
+                    coat_normal: Vec3::Z,
+                    sheen: Rgb::splat(sheen),
+                    sheen_roughness: roughness,
+                };
+                let bsdf = rough(alpha, SurfaceParameters { layers: Some(layers), ..base });
+                for angle in [0.5, 50.0, 77.0, 88.5] {
+                    let found = albedo(&bsdf, tilted(angle, 2.0), 1 << 15);
+                    assert!(found.max_element() < 1.0 + 4e-3, "{layers:?} at {angle}°: {found}");
+                    // A coat of index 1.5 reflects 9.2 % of diffuse light, cloth of the least roughness up to all of it
+                    // at the horizon: more than half is left of any.
+                    let least = if angle < 80.0 { 0.5 } else { 0.1 };
+                    assert!(found.min_element() > least, "{layers:?} at {angle}°: {found}");
+                }
+            }
+        }
     }
 }
 

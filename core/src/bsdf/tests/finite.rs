@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::bsdf::event::{SampleKind, Transport};
+use crate::bsdf::surface::Layers;
 
 fn directions() -> Vec<Vec3> {
     let mut all = vec![Vec3::X, Vec3::Z, -Vec3::Z];
@@ -36,6 +37,19 @@ fn values_are_finite_and_not_negative() {
         transmission: 7.0,
         ..PLASTIC
     });
+    let layers = Layers {
+        coat: 1.0,
+        coat_roughness: 0.0,
+        coat_normal: Vec3::Z,
+        sheen: Rgb::ONE,
+        sheen_roughness: 0.0,
+    };
+    for surface in [METAL, SOLID] {
+        for (coat_roughness, sheen_roughness) in [(0.0, 0.0), (0.04, 0.3), (1.0, 1.0), (f32::NAN, f32::NAN)] {
+            let layers = Some(Layers { coat_roughness, sheen_roughness, ..layers });
+            surfaces.push(SurfaceParameters { layers, ..surface });
+        }
+    }
     for surface in surfaces {
         let bsdf = Bsdf::from_surface(&surface);
         for wo in directions() {

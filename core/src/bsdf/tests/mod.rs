@@ -11,7 +11,7 @@ pub(in crate::bsdf) mod oracle;
 mod reciprocity;
 
 use crate::bsdf::Bsdf;
-use crate::bsdf::surface::{SurfaceParameters, Walls};
+use crate::bsdf::surface::{Layers, SurfaceParameters, Walls};
 use crate::math::colour::Rgb;
 use glam::{Vec2, Vec3};
 
@@ -25,6 +25,7 @@ pub(crate) const PLASTIC: SurfaceParameters = SurfaceParameters {
     ior: 1.5,
     transmission: 0.0,
     walls: Walls::Thin,
+    layers: None,
 };
 pub(crate) const LAMBERT: SurfaceParameters = SurfaceParameters { specular: 0.0, ..PLASTIC };
 pub(crate) const METAL: SurfaceParameters = SurfaceParameters { metallic: 1.0, ..PLASTIC };
@@ -83,6 +84,20 @@ impl Uniform {
             ior: 1.05 + 1.5 * self.next(),
             transmission: pick(self.next()),
             walls: if self.next() < 0.5 { Walls::Thin } else { Walls::Solid },
+            layers: None,
         }
+    }
+
+    /// Any surface under any layers, the coat's normal along that of the surface.
+    pub(crate) fn layered(&mut self) -> SurfaceParameters {
+        let some = |u: f32| if u < 0.3 { 0.0 } else { (u - 0.3) / 0.7 };
+        let layers = Layers {
+            coat: some(self.next()),
+            coat_roughness: 0.032 + 0.968 * self.next(),
+            coat_normal: Vec3::Z,
+            sheen: Rgb::new(self.next(), self.next(), self.next()) * some(self.next()),
+            sheen_roughness: self.next(),
+        };
+        SurfaceParameters { layers: Some(layers), ..self.surface() }
     }
 }

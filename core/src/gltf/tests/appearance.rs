@@ -215,3 +215,44 @@ fn unused_textures_are_not_loaded() {
     assert_eq!(loaded.report.textures, 0);
     assert!(loaded.warnings.iter().any(|p| p.pointer == "/images/0/uri" && p.detail.contains("missing")));
 }
+
+#[test]
+fn unlit_materials_are_black_but_for_the_eye() {
+    let loaded = textured(json!({"alphaMode": "BLEND", "emissiveFactor": [1, 1, 1],
+        "pbrMetallicRoughness": {"baseColorFactor": [0.5, 1, 1, 0.5], "baseColorTexture": {"index": 0}},
+        "extensions": {"KHR_materials_unlit": {}, "KHR_materials_transmission": {"transmissionFactor": 1}}}))
+    .load();
+    let at = loaded.scene.interaction(0, 0, Vec2::new(0.75, 0.1), Moment::STILL);
+    assert!((at.shown().unwrap() - Vec3::new(0.5, 0.215_860_5, 0.0)).length() < 1e-6, "{:?}", at.shown());
+    assert!((at.alpha() - 0.5 * 128.0 / 255.0).abs() < 1e-6);
+    let surface = at.surface();
+    assert_eq!((surface.base_color, surface.metallic), (Vec3::ZERO, 0.0));
+    assert_eq!((surface.specular, surface.transmission), (0.0, 0.0));
+    assert_eq!((at.emission(Side::Front), loaded.report.emissive_triangles), (Vec3::ZERO, 0));
+    assert!(textured(json!({})).load().scene.interaction(0, 0, Vec2::ZERO, Moment::STILL).shown().is_none());
+}
+
+#[test]
+fn layers_are_read_with_their_textures() {
+    let loaded = textured(json!({"extensions": {
+        "KHR_materials_clearcoat": {"clearcoatFactor": 0.5, "clearcoatTexture": {"index": 0},
+            "clearcoatRoughnessFactor": 0.8, "clearcoatRoughnessTexture": {"index": 0},
+            "clearcoatNormalTexture": {"index": 0}},
+        "KHR_materials_sheen": {"sheenColorFactor": [1, 0.5, 1], "sheenColorTexture": {"index": 0},
+            "sheenRoughnessFactor": 0.5, "sheenRoughnessTexture": {"index": 0}}}}))
+    .load();
+    let at = loaded.scene.interaction(0, 0, Vec2::new(0.75, 0.1), Moment::STILL);
+    let layers = at.surface().layers.unwrap();
+    let half = 128.0 / 255.0;
+    assert_eq!(layers.coat, 0.5);
+    assert!((layers.coat_roughness - 0.8 * half).abs() < 1e-6 && (layers.sheen_roughness - 0.5 * half).abs() < 1e-6);
+    assert!((layers.sheen - Vec3::new(1.0, 0.5 * 0.215_860_5, 0.0)).length() < 1e-6, "{layers:?}");
+    // Texel (1, 0.5, 0): the map points along the tangent and down, which the surface does not allow.
+    assert_eq!(layers.coat_normal, Vec3::Z);
+    assert!(textured(json!({"extensions": {"KHR_materials_clearcoat": {}, "KHR_materials_sheen": {}}}))
+        .load()
+        .scene
+        .materials
+        .iter()
+        .all(|material| material.layers.is_none()));
+}

@@ -3,6 +3,7 @@
 mod appearance;
 mod builder;
 mod bundles;
+mod compressed;
 mod geometry;
 mod motion;
 mod placement;

@@ -10,7 +10,7 @@ use crate::path::rules::Weighing;
 use crate::path::tally::{Receiver, Tally};
 use crate::path::throughput::Throughput;
 use crate::path::vertex::Density;
-use crate::path::walk::{EdgeKind, Walk};
+use crate::path::walk::{EdgeKind, Sight, Walk};
 use crate::scene::emission::EmissionDensity;
 use crate::scene::interaction::Interaction;
 use crate::settings::Shadows;
@@ -64,6 +64,9 @@ pub fn hit_surface<S: Throughput<EyeState>, L: Throughput<LightState>>(
     tally: &mut Tally,
 ) {
     if !at.material.emits() {
+        if at.material.unlit.is_some() {
+            see_unlit::<S, L>(walk, at, triangle, tally);
+        }
         return;
     }
     let (scene, direction) = (walk.scene, walk.edge.ray.direction);
@@ -83,6 +86,27 @@ pub fn hit_surface<S: Throughput<EyeState>, L: Throughput<LightState>>(
     };
     let jacobian = walk.edge.cos / squared;
     deposit::<S, L>(walk, &Hit { light, radiance, next_event, emission, jacobian }, tally);
+}
+
+/// The colour of an unlit surface, where the walk is what the eye sees: there is no other technique.
+pub fn see_unlit<S: Throughput<EyeState>, L: Throughput<LightState>>(
+    walk: &Walk<'_, EyeState, S>,
+    at: &Interaction<'_>,
+    (instance, triangle): (u32, u32),
+    tally: &mut Tally,
+) {
+    let (scene, rules) = (walk.scene, walk.rules);
+    if walk.sight != Sight::Clear {
+        return;
+    }
+    let technique = (0, walk.scatterings as usize + 2);
+    let Some(radiance) = scene.unlit_on(&walk.edge.ray, at) else { return };
+    let names = [scene.data.node_name(instance, triangle), &at.material.name];
+    let Some(start) = rules.language.light_start(rules.language.tag_of(&names)) else { return };
+    if rules.uses(technique) || rules.weighing == Weighing::ToLens {
+        let light = L::in_state(start, radiance);
+        tally.deposit(rules, Receiver::Own, technique, &walk.carried, &light, Rgb::ONE);
+    }
 }
 
 fn deposit<S: Throughput<EyeState>, L: Throughput<LightState>>(
