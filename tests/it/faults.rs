@@ -8,6 +8,7 @@ use ovtigre_tests::{
     picture::{rendered, settings},
     program::Farm,
     room::room,
+    services::Shared,
 };
 use std::{fs, path::Path};
 
@@ -110,4 +111,43 @@ fn a_killed_farm_goes_on_where_it_was() {
         picture.channels == undisturbed(&plain(), SAMPLES).channels,
         "the picture differs from that of core alone"
     );
+}
+
+/// Two farms over one database and one bucket: workers and one of the farms are killed, another comes, and the picture is
+/// that of core alone. `dies` is the number of the farm that is killed.
+fn assert_a_server_may_die(name: &str, dies: usize) {
+    let Some(shared) = Shared::place(name) else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let server = |n: usize| Farm::start_with(&folder.path().join(format!("farm-{n}")), &shared.flags());
+    let mut farms = vec![server(0), server(1)];
+    let samples = 2 * SAMPLES;
+    let job = submit(&farms[0], folder.path(), &plain(), samples, &[]);
+    let (first, _second) = (farms[0].worker(), farms[1].worker());
+    farms[1].wait(&job, |j| batches(j) > 0);
+    first.kill();
+    let then = farms[1].wait(&job, |j| batches(j) > 2);
+    assert_eq!(then["state"], "running", "the job was over before anything could go wrong: {then}");
+    farms.remove(dies).kill();
+    farms.push(server(2));
+    let (_third, _fourth) = (farms[0].worker(), farms[1].worker());
+    farms[1].wait(&job, |j| j["state"] == "done");
+    for farm in &farms {
+        let done = farm.wait(&job, |j| j["state"] == "done");
+        assert_eq!((&done["invalid_samples"], &done["batches_done"]), (&0.into(), &done["batches_asked"]));
+        let picture = fetch(farm, &job, folder.path());
+        assert!(
+            picture.channels == undisturbed(&plain(), samples).channels,
+            "the picture differs from that of core alone"
+        );
+    }
+}
+
+#[test]
+fn a_killed_server_that_took_the_job_changes_no_byte() {
+    assert_a_server_may_die("took", 0);
+}
+
+#[test]
+fn a_killed_server_that_others_worked_for_changes_no_byte() {
+    assert_a_server_may_die("other", 1);
 }

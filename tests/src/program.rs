@@ -58,9 +58,15 @@ pub struct Farm {
 impl Farm {
     /// Starts a farm over a folder.
     pub fn start(data: &Path) -> Self {
+        Self::start_with(data, &[])
+    }
+
+    /// Starts a farm over a folder, with further flags.
+    pub fn start_with(data: &Path, further: &[&str]) -> Self {
         let mut child = Command::new(program())
             .args(["serve", "--listen", "127.0.0.1:0", "--data"])
             .arg(data)
+            .args(further)
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(Stdio::null())

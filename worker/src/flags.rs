@@ -14,6 +14,9 @@ pub struct WorkFlags {
     /// The farm's address.
     #[arg(long, value_name = "URL", default_value = "http://127.0.0.1:7700")]
     pub server: String,
+    /// Token that the farm knows [default: the environment's OVTIGRE_TOKEN].
+    #[arg(long, value_name = "TOKEN")]
+    pub token: Option<String>,
     /// Threads to render with [default: one a core].
     #[arg(long, value_name = "N", value_parser = threads)]
     pub threads: Option<NonZeroUsize>,
@@ -49,6 +52,11 @@ impl WorkFlags {
         let cores = available_parallelism().unwrap_or(NonZeroUsize::MIN);
         Config {
             server: self.server.clone(),
+            token: self
+                .token
+                .clone()
+                .or_else(|| std::env::var("OVTIGRE_TOKEN").ok())
+                .filter(|t| !t.is_empty()),
             name: self.name.clone().unwrap_or_else(machine),
             threads: self.threads.unwrap_or(cores).get(),
             tags: self.tags.clone(),

@@ -152,7 +152,8 @@ impl<R: Renderer> Labour<R> {
             method: settings.method.name().to_owned(),
         };
         let seconds = start.elapsed().as_secs_f64();
-        Ok(Some(Rendered { lease: id.clone(), sum, size: settings.size, attributes, seconds }))
+        let (lease, size, upload) = (id.clone(), settings.size, work.lease.upload.clone());
+        Ok(Some(Rendered { lease, sum, size, attributes, seconds, upload }))
     }
 
     fn scene(&self, lease: &Lease, files: Option<Files>) -> Result<Arc<R::Scene>, Failed> {

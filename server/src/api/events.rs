@@ -65,7 +65,7 @@ pub async fn stream(
 ) -> Result<Response> {
     let id: JobId = id("job", &name)?;
     let last = last_seen(&headers)?;
-    let settled = farm.live(&id).is_none();
+    let settled = farm.meet(&id).await?.is_none();
     let mut watching = Watching::new(farm, id, last);
     watching.look().await?;
     if settled && last.is_some() && watching.events.is_empty() {

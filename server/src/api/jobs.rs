@@ -3,12 +3,13 @@
 use super::{
     body::Document,
     error::{ApiError, Result},
+    guard::Caller,
     params::{Named, Params, cursor, id, limit},
     tag,
 };
 use crate::farm::{Farm, spec::JobSpec};
 use axum::{
-    Json,
+    Extension, Json,
     extract::State,
     http::{HeaderMap, StatusCode, header},
     response::{IntoResponse as _, Response},
@@ -62,6 +63,7 @@ impl From<JobSpec> for DryRun {
 /// A job is sent.
 pub async fn create(
     State(farm): State<Arc<Farm>>,
+    Extension(caller): Extension<Caller>,
     Params(params): Params<CreateParams>,
     headers: HeaderMap,
     Document(request): Document<JobRequest>,
@@ -74,7 +76,7 @@ pub async fn create(
         Some(Ok(key)) => Some(key.to_owned()),
         Some(Err(_)) => return Err(ApiError::header("Idempotency-Key is not ASCII text")),
     };
-    let status = farm.submit(request, key).await?;
+    let status = farm.submit(request, key, caller.token).await?;
     let location = [(header::LOCATION, route::job(&status.id))];
     Ok((StatusCode::ACCEPTED, location, with_tag(status)).into_response())
 }

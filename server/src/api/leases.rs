@@ -25,6 +25,16 @@ pub async fn sum(
     Ok(Json(Committed { commit }))
 }
 
+/// A batch's sum was put where its lease said.
+pub async fn handed(
+    State(farm): State<Arc<Farm>>,
+    Named(name): Named,
+    headers: HeaderMap,
+) -> Result<Json<Committed>> {
+    let commit = farm.commit_handed(&id("lease", &name)?, seconds(&headers)?).await?;
+    Ok(Json(Committed { commit }))
+}
+
 fn seconds(headers: &HeaderMap) -> Result<Duration> {
     let Some(value) = headers.get(SECONDS_HEADER) else { return Ok(Duration::ZERO) };
     let seconds = value.to_str().ok().and_then(|text| text.trim().parse().ok());

@@ -111,6 +111,12 @@ impl Merge {
         }
     }
 
+    /// Takes up what was brought to and looked at by whoever appends.
+    pub(super) fn follow(&mut self, commits: Vec<CommitRow>, checkpoints: u32) {
+        self.checkpoints = self.checkpoints.max(checkpoints);
+        commits.into_iter().for_each(|row| self.add(Arrival { row, sum: None }));
+    }
+
     /// Keeps at most `bytes` of decoded sums among what waits: the others are read from their blobs
     /// when their turn comes.
     fn slim(&mut self, bytes: u64) {
@@ -225,6 +231,10 @@ impl Farm {
         let mut held = Arc::clone(&live.merge).lock_owned().await;
         if held.is_none() {
             self.make_room(live);
+        }
+        if self.is_shared() && live.mandate().is_none() {
+            held = self.catch_up(live, held).await?;
+        } else if held.is_none() {
             *held = Some(self.load(live).await?);
         }
         if let Some(merge) = held.as_mut() {
@@ -233,7 +243,7 @@ impl Farm {
         Ok(held)
     }
 
-    async fn load(&self, live: &Live) -> Result<Merge> {
+    pub(super) async fn load(&self, live: &Live) -> Result<Merge> {
         let mut ledger = self.store.ledger(&live.id).await?;
         let mut kept = Vec::with_capacity(ledger.snapshots.len());
         let mut lost = Vec::new();
@@ -244,6 +254,7 @@ impl Farm {
             }
         }
         if !lost.is_empty() {
+            self.may_mend(live)?;
             let batches = lost.iter().flat_map(|(lane, blocks)| (0..*blocks).map(|block| lane.at(block)));
             self.again(live, batches.collect(), lost.iter().map(|(lane, _)| *lane).collect()).await?;
             ledger = self.store.ledger(&live.id).await?;
@@ -251,9 +262,18 @@ impl Farm {
         let schedule = Arc::clone(&live.schedule);
         let mut merge =
             Merge::new(schedule, live.spec.settings.planes(), kept, ledger.commits, ledger.checkpoints);
+        live.set_brought(ledger.brought);
         live.arrivals().into_iter().for_each(|arrival| merge.add(arrival));
         publish(live, &merge);
         Ok(merge)
+    }
+
+    /// An error where another server appends to the job's sums: what is missing here is only replaced there.
+    fn may_mend(&self, live: &Live) -> Result<()> {
+        if self.is_shared() && live.mandate().is_none() {
+            return Err(FarmError::Damaged("a part of its sums is not there".to_owned()));
+        }
+        Ok(())
     }
 
     /// What is kept of a lane; `None` where that is lost or damaged.
@@ -293,6 +313,11 @@ impl Farm {
 
     /// Appends what can be, looks at checkpoints; true when the job is over.
     pub async fn advance(&self, live: &Arc<Live>) -> Result<bool> {
+        if !self.holds(live).await? {
+            // Whoever appends reads from the store what was brought.
+            live.arrivals();
+            return Ok(false);
+        }
         let mut held = self.sums(live).await?;
         loop {
             if self.stopping.is_cancelled() {
@@ -325,6 +350,14 @@ impl Farm {
         }
     }
 
+    /// Appends what can be, and writes nothing down.
+    pub(super) async fn append_all(&self, live: &Live, mut held: Held) -> Result<Held> {
+        while let Next::Append(ready) = held.as_mut().expect("loaded by the caller").advance() {
+            held = self.append(live, held, ready).await?;
+        }
+        Ok(held)
+    }
+
     async fn append(&self, live: &Live, mut held: Held, ready: Vec<Arrival>) -> Result<Held> {
         let mut sums = Vec::with_capacity(ready.len());
         let mut bytes = 0;
@@ -355,6 +388,7 @@ impl Farm {
         })
         .await??;
         if !lost.is_empty() {
+            self.may_mend(live)?;
             self.again(live, lost, Vec::new()).await?;
         }
         self.counters.appended(appended, bytes);
@@ -383,7 +417,7 @@ impl Farm {
             .await?;
             held = back;
             self.blobs.put(&BlobName::Prefix(live.id.clone(), lane, blocks), bytes.into()).await?;
-            self.store.set_snapshot(&live.id, lane, blocks).await?;
+            self.store.set_snapshot(&live.id, Self::mandate(live)?, lane, blocks).await?;
             held.as_mut().expect("loaded by the caller").snapshots.insert(lane, blocks);
             self.forget_partials(live, lane, since, blocks).await?;
         }

@@ -159,7 +159,10 @@ impl Farm {
         }
         self.again(live, again.into_iter().collect(), spoilt.into_iter().map(|(lane, _)| lane).collect())
             .await?;
-        // What is in memory has wrong sums in it: it is built again from what is kept.
+        // What is in memory, here or at another server, has wrong sums in it: it is read again.
+        self.store.free_merge(&live.id).await?;
+        live.set_mandate(None);
+        live.set_elsewhere(false);
         drop(live.arrivals());
         *held = None;
         live.kick.notify_one();

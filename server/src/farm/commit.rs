@@ -8,9 +8,10 @@ use super::{
     error::{FarmError, Result},
     ids::batch_of,
     live::{Arrival, Live},
+    rules::PARTIAL_BYTES_MAX,
 };
 use crate::{
-    blobs::BlobName,
+    blobs::{BlobError, BlobName},
     store::row::{BatchKey, CommitOutcome, CommitRow, NewCommit},
 };
 use bytes::Bytes;
@@ -19,19 +20,57 @@ use ovtigre_proto::{
     id::{BlobId, JobId, LeaseId, WorkerId},
     lease::{Commit, FailureKind, LeaseFailure},
 };
-use std::time::Duration;
+use std::{sync::Arc, time::Duration};
 
 /// Longest time that is believed of one batch.
 const TIME_MAX: Duration = Duration::from_hours(30 * 24);
 
+/// How a sum came.
+#[derive(Clone, Copy)]
+enum Way {
+    /// With the request.
+    Here,
+    /// It is among the blobs.
+    Handed,
+}
+
 impl Farm {
     /// The partial EXR of a lease's batch, on which its worker spent `time`. The first sum of a
     /// batch counts, even after its lease has ended; a further one is compared with it.
-    pub async fn commit(&self, lease: &LeaseId, partial: Bytes, time: Duration) -> Result<Commit> {
+    pub async fn commit(self: &Arc<Self>, lease: &LeaseId, partial: Bytes, time: Duration) -> Result<Commit> {
+        self.take_sum(lease, partial, time, Way::Here).await
+    }
+
+    /// The same of a partial EXR that its worker has put where the lease said. An error where it is not
+    /// there: it may have been taken before.
+    pub async fn commit_handed(self: &Arc<Self>, lease: &LeaseId, time: Duration) -> Result<Commit> {
+        let name = BlobName::Handed(lease.clone());
+        let bytes = self.blobs.size(&name).await.map_err(|error| match error {
+            BlobError::Missing(_) => FarmError::not_found("sum of lease", lease),
+            other => other.into(),
+        })?;
+        let limit = 2 * PARTIAL_BYTES_MAX as u64;
+        let taken = if bytes > limit {
+            Err(FarmError::TooLarge { limit })
+        } else {
+            let partial = self.blobs.get(&name).await?;
+            self.take_sum(lease, partial, time, Way::Handed).await
+        };
+        self.blobs.delete(&name).await?;
+        taken
+    }
+
+    async fn take_sum(
+        self: &Arc<Self>,
+        lease: &LeaseId,
+        partial: Bytes,
+        time: Duration,
+        way: Way,
+    ) -> Result<Commit> {
         self.need_room_for_sums()?;
         let (job, key) = batch_of(lease).ok_or_else(|| FarmError::not_found("lease", lease))?;
         let row = self.store.job(&job).await?.ok_or_else(|| FarmError::not_found("lease", lease))?;
-        let Some(live) = self.live(&job).filter(|_| !row.state.is_over()) else {
+        let Some(live) = self.meet(&job).await?.filter(|_| !row.state.is_over()) else {
             self.counters.count(Fate::NotNeeded);
             return Ok(Commit::NotNeeded);
         };
@@ -45,7 +84,10 @@ impl Farm {
             return self.compare(&live, key, &row.worker, audit, &hash).await;
         }
         let name = BlobName::Partial(job.clone(), key, hash.clone());
-        self.blobs.put(&name, partial).await?;
+        match way {
+            Way::Here => self.blobs.put_once(&name, partial).await?,
+            Way::Handed => self.blobs.rename(&BlobName::Handed(lease.clone()), &name).await?,
+        }
         let worker = self.book().lease(lease).map(|held| held.row.worker.clone());
         let micros = time.min(TIME_MAX).as_micros() as u64;
         let row = CommitRow { batch: key, hash, worker_micros: micros };

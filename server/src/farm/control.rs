@@ -61,7 +61,7 @@ impl Farm {
     }
 
     /// Brings the book up to what the store says.
-    fn follow(&self, row: &JobRow) {
+    pub(super) fn follow(&self, row: &JobRow) {
         let mut book = self.book();
         if row.state.is_over() {
             book.remove(&row.id);

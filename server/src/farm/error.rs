@@ -85,6 +85,12 @@ pub enum FarmError {
     /// What is kept of a job cannot be used.
     #[error("what is kept of the job cannot be used: {0}")]
     Damaged(String),
+    /// Too many jobs of one token.
+    #[error("there are {most} jobs under way of this token: wait for some to end, or cancel some")]
+    TooManyJobs {
+        /// As many as there may be.
+        most: usize,
+    },
     /// The disk is nearly full.
     #[error("the farm's disk is nearly full: make room on it, or remove jobs with ?purge=true")]
     Full,

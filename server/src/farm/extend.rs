@@ -142,7 +142,7 @@ impl Farm {
                 }
             };
             self.blobs.put(&BlobName::Prefix(live.id.clone(), lane, blocks), bytes.into()).await?;
-            self.store.set_snapshot(&live.id, lane, blocks).await?;
+            self.store.set_snapshot(&live.id, Self::mandate(live)?, lane, blocks).await?;
             if since > 0 {
                 self.blobs.delete(&BlobName::Prefix(live.id.clone(), lane, since)).await?;
             }

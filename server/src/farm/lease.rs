@@ -6,18 +6,26 @@ use super::{
     counters::Fate,
     crew::Member,
     error::{FarmError, Result},
+    ids::batch_of,
 };
-use crate::store::row::{Claim, LeaseRow, Released};
+use crate::{
+    blobs::BlobName,
+    store::row::{Claim, LeaseRow, Released},
+};
 use ovtigre_proto::{
     id::{JobId, LeaseId, WorkerId},
     lease::{Exchange, ExchangeReply, FailureKind, Lease, LeaseFailure, WorkerJoin},
     status::WorkerState,
 };
 use std::{
+    collections::BTreeSet,
     pin::pin,
     sync::Arc,
     time::{Duration, Instant},
 };
+
+/// Where a sum may be put directly, that is so for so long after its lease was given.
+const UPLOAD: Duration = Duration::from_hours(12);
 
 impl Farm {
     /// A worker's beat: renews what it holds, tells what to drop, hands out what it wants. A worker that
@@ -73,9 +81,13 @@ impl Farm {
         };
         let now = Instant::now();
         let noted = known.as_ref().filter(|m| m.state == state && m.noted.elapsed() < self.rules.note_beat);
-        if noted.is_none() && !self.store.see_worker(id, state).await? {
-            return Err(FarmError::not_found("worker", id));
-        }
+        let state = match noted {
+            Some(_) => state,
+            None => match self.store.see_worker(id, state).await? {
+                None => return Err(FarmError::not_found("worker", id)),
+                Some(told) => told,
+            },
+        };
         let capacity = said.wants.min(self.rules.wants_max) + said.holding.len() as u32;
         let member = Member {
             state,
@@ -105,6 +117,8 @@ impl Farm {
                         due.push(progress.lease.clone());
                     }
                     Some(_) => {}
+                    // Another server may have handed it out.
+                    None if self.is_shared() => due.push(progress.lease.clone()),
                     None => lost.push(progress.lease.clone()),
                 }
             }
@@ -115,6 +129,11 @@ impl Farm {
             for id in due {
                 match book.lease(&id) {
                     Some(held) if renewed.contains(&id) => held.renewed = Instant::now(),
+                    None if renewed.contains(&id)
+                        && let Some((job, batch)) = batch_of(&id) =>
+                    {
+                        book.hold(LeaseRow { id, job, batch, worker: worker.clone() }, None);
+                    }
                     _ => lost.push(id),
                 }
             }
@@ -125,12 +144,31 @@ impl Farm {
     async fn hand_out(&self, worker: &WorkerId, join: &WorkerJoin, said: &Exchange) -> Result<Vec<Lease>> {
         let active = self.crew().active(self.rules.silence) as usize;
         let wants = said.wants.min(self.rules.wants_max);
-        let asker = Asker { id: worker, join, scenes: &said.scenes, wants, active };
+        let mut leases = Vec::new();
+        // Another server may have been faster: what is left is known after the first try.
+        for _ in 0..3 {
+            let left = wants - leases.len() as u32;
+            let asker = Asker { id: worker, join, scenes: &said.scenes, wants: left, active };
+            let (handed_out, refused) = self.claim_offers(&asker).await?;
+            leases.extend(handed_out);
+            if refused.is_empty() || !self.is_shared() {
+                break;
+            }
+            for job in &refused {
+                self.refresh_plan(job).await?;
+            }
+        }
+        Ok(leases)
+    }
+
+    /// Claims what the book offers; also returns the jobs of whose batches some were refused.
+    async fn claim_offers(&self, asker: &Asker<'_>) -> Result<(Vec<Lease>, BTreeSet<JobId>)> {
+        let Asker { id: worker, join, .. } = *asker;
         // Twice what workers hold or would take: none stands idle while a checkpoint is taken.
         let ahead = 2 * self.crew().capacity(self.rules.silence);
-        let offers = self.book().offer(&asker, ahead);
+        let offers = self.book().offer(asker, ahead);
         if offers.is_empty() {
-            return Ok(Vec::new());
+            return Ok((Vec::new(), BTreeSet::new()));
         }
         let ids: Vec<LeaseId> = offers.iter().map(|offer| self.ids.lease(&offer.job, offer.batch)).collect();
         let claimed = match self.claim(worker, join, &offers, &ids).await {
@@ -142,15 +180,17 @@ impl Farm {
             }
         };
         let mut leases = Vec::new();
-        let mut begun = Vec::new();
+        let (mut begun, mut refused) = (Vec::new(), BTreeSet::new());
         for ((offer, id), claimed) in offers.into_iter().zip(ids).zip(claimed) {
             let batch = self.live(&offer.job).and_then(|live| live.batch(offer.batch));
             // Not claimed: the job was paused or ended meanwhile, or began elsewhere on other processors.
             let (true, Some(batch)) = (claimed, batch) else {
+                refused.insert(offer.job.clone());
                 self.book().withdraw(offer);
                 continue;
             };
             let Offer { job, batch: key, scene, settings, audit, .. } = offer;
+            let upload = if audit.is_some() { None } else { self.upload_to(&id).await };
             let row = LeaseRow { id: id.clone(), job: job.clone(), batch: key, worker: worker.clone() };
             self.book().hold(row, audit);
             let seconds = self.rules.lease.as_secs_f64();
@@ -161,12 +201,20 @@ impl Farm {
                 settings: settings.as_ref().clone(),
                 batch,
                 seconds,
+                upload,
             });
             begun.push(job);
         }
         begun.dedup();
         begun.iter().filter_map(|job| self.live(job)).for_each(|live| live.changed());
-        Ok(leases)
+        Ok((leases, refused))
+    }
+
+    /// Where a lease's sum may be put directly.
+    async fn upload_to(&self, lease: &LeaseId) -> Option<String> {
+        let address = self.blobs.address_to_put(&BlobName::Handed(lease.clone()), UPLOAD).await;
+        // Without one it is brought to the farm.
+        address.inspect_err(|error| tracing::warn!(%error, "no address to put sums at")).ok().flatten()
     }
 
     /// Claims what is offered in the store; whether each may be handed out. Jobs that are not pinned to a

@@ -15,7 +15,9 @@ pub mod ids;
 pub mod join;
 pub mod lease;
 pub mod live;
+pub mod mandates;
 pub mod open;
+pub mod others;
 pub mod paths;
 pub mod picture;
 pub mod reach;
@@ -64,6 +66,8 @@ pub struct Farm {
     pub counters: Counters,
     /// Cancelled when it stops.
     pub stopping: CancellationToken,
+    /// Its name among the servers over the same store.
+    name: String,
     inspect: Inspect,
     ids: Ids,
     fullness: space::Fullness,
@@ -96,6 +100,8 @@ impl Farm {
     fn forget_live(&self, id: &JobId) {
         if let Some(live) = held(&self.lives).remove(id) {
             live.changed();
+            // Ends the task that appends to it.
+            live.kick.notify_one();
         }
     }
 

@@ -6,6 +6,7 @@ use super::{
     error::{FarmError, Result},
     live::{Ending, Live, Waits},
 };
+use crate::store::error::StoreError;
 use ovtigre_proto::{lease::FailureKind, status::JobState};
 use std::{
     sync::Arc,
@@ -53,17 +54,30 @@ impl Farm {
     pub(super) async fn tick(self: Arc<Self>) {
         let mut beat = tokio::time::interval(self.rules.tick);
         beat.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
+        let mut keep = tokio::time::interval(self.rules.keep_mandate);
+        keep.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
         let mut hour = tokio::time::interval(Duration::from_hours(1));
         loop {
             let done = tokio::select! {
                 () = self.stopping.cancelled() => return,
-                _ = beat.tick() => self.reap().await,
+                _ = keep.tick() => self.keep_and_tell().await,
+                _ = beat.tick() => self.reap_and_follow().await,
                 _ = hour.tick() => self.store.forget_keys(self.rules.keys).await.map_err(FarmError::from),
             };
             if let Err(error) = done {
                 tracing::error!(%error, "looking after leases and deadlines failed");
             }
         }
+    }
+
+    async fn reap_and_follow(self: &Arc<Self>) -> Result<()> {
+        self.follow_others().await?;
+        self.reap().await
+    }
+
+    async fn keep_and_tell(&self) -> Result<()> {
+        self.keep_mandates().await?;
+        self.tell_others().await
     }
 
     /// Appends what comes until the job is over.
@@ -79,6 +93,7 @@ impl Farm {
             match self.advance(&live).await {
                 Ok(true) => return,
                 Ok(false) => {}
+                Err(FarmError::Store(StoreError::Superseded)) => self.lose(&live).await,
                 Err(error) => {
                     // What is in memory may be half done: it is built again from what is kept.
                     *live.merge.lock().await = None;
@@ -100,6 +115,10 @@ impl Farm {
             let failed = self.settle_without_picture(live, error.to_string()).await;
             match failed {
                 Ok(()) => return true,
+                Err(FarmError::Store(StoreError::Superseded)) => {
+                    self.lose(live).await;
+                    return false;
+                }
                 Err(error) => tracing::error!(job = %live.id, %error, "the job could not be failed"),
             }
         }

@@ -30,10 +30,16 @@ pub struct Rules {
     pub fresh_bytes: u64,
     /// A lane's blocks since its last blob of sums, at most: so many partials are kept.
     pub partials_kept: u32,
+    /// A server that was not heard of for so long loses the jobs whose sums it appends to.
+    pub mandate: Duration,
+    /// Mandates are lengthened, and pictures' progress is told to other servers, so often.
+    pub keep_mandate: Duration,
     /// Batches given to a worker at a time.
     pub wants_max: u32,
     /// Version of the program whose workers render new jobs.
     pub build: &'static str,
+    /// Jobs under way that were sent with one token, at most.
+    pub jobs_per_token: usize,
     /// Share of batches that are rendered again by another worker, to compare.
     pub audit: f64,
     /// A worker that failed at so many jobs by its own fault, and brought nothing since, is put aside.
@@ -71,8 +77,11 @@ impl Default for Rules {
             kept_sums_bytes: 512 << 20,
             fresh_bytes: 256 << 20,
             partials_kept: 8,
+            mandate: Duration::from_secs(5),
+            keep_mandate: Duration::from_secs(1),
             wants_max: 64,
             build: env!("CARGO_PKG_VERSION"),
+            jobs_per_token: 1000,
             audit: 0.0,
             failing_jobs: 3,
             failing_workers: 3,

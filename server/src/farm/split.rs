@@ -70,6 +70,15 @@ impl Plan {
         Some(batch)
     }
 
+    /// Goes on where `cursors` and `returned` say, whatever was handed out here.
+    pub fn refresh(
+        &mut self,
+        cursors: impl IntoIterator<Item = (Lane, u32)>,
+        returned: impl IntoIterator<Item = BatchKey>,
+    ) {
+        *self = Self::new(Arc::clone(&self.schedule), cursors, returned, self.reached as u32);
+    }
+
     /// A batch that was handed out comes back.
     pub fn put_back(&mut self, batch: BatchKey) {
         self.returned.insert(batch);

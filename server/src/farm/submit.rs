@@ -60,6 +60,17 @@ impl Farm {
         resolve(request, &contents, &self.rules).map_err(FarmError::Request)
     }
 
+    /// An error where the owner has as many jobs under way as one may have.
+    fn has_room_for(&self, owner: Option<&str>) -> Result<()> {
+        let most = self.rules.jobs_per_token;
+        let its =
+            |owner| self.lives().iter().filter(|live| live.spec.owner.as_deref() == Some(owner)).count();
+        match owner {
+            Some(owner) if its(owner) >= most => Err(FarmError::TooManyJobs { most }),
+            _ => Ok(()),
+        }
+    }
+
     async fn upload_at(&self, pointer: &str, id: &BlobId) -> Result<SceneReport> {
         let row = self.store.scene(id).await?;
         row.map(|row| row.report).ok_or_else(|| {
@@ -68,17 +79,26 @@ impl Farm {
         })
     }
 
-    /// Takes a job. The same request under the same key is taken once.
-    pub async fn submit(self: &Arc<Self>, request: JobRequest, key: Option<String>) -> Result<JobStatus> {
+    /// Takes a job of `owner`, a token's id. The same request of one owner under the same key is taken once.
+    pub async fn submit(
+        self: &Arc<Self>,
+        request: JobRequest,
+        key: Option<String>,
+        owner: Option<String>,
+    ) -> Result<JobStatus> {
         if key.as_ref().is_some_and(|key| key.is_empty() || key.len() > KEY_MAX) {
             let detail = format!("the idempotency key has 1 to {KEY_MAX} bytes");
             return Err(FarmError::Request(vec![fault("", detail)]));
         }
         let asked = serde_json::to_vec(&request).map_err(|e| FarmError::Damaged(e.to_string()))?;
-        let key =
-            key.map(|key| IdempotencyKey { key, fingerprint: blake3::hash(&asked).to_hex().to_string() });
+        let key = key.map(|key| IdempotencyKey {
+            key: format!("{}/{key}", owner.as_deref().unwrap_or_default()),
+            fingerprint: blake3::hash(&asked).to_hex().to_string(),
+        });
         self.need_room()?;
-        let spec = self.check(request).await?;
+        let mut spec = self.check(request).await?;
+        self.has_room_for(owner.as_deref())?;
+        spec.owner = owner;
         let id = self.ids.job();
         let scene = spec.request.scene.clone().expect("checked: a scene is there");
         let new = NewJob {
@@ -172,6 +192,7 @@ pub fn resolve(
         error_target: request.error,
         seconds: request.seconds,
         build: rules.build.to_owned(),
+        owner: None,
         method_reason: chosen.reason.to_owned(),
         unreachable,
         warnings,

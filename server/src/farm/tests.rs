@@ -6,6 +6,7 @@ mod extending;
 mod faults;
 mod layers;
 mod merging;
+mod replicas;
 mod sharing;
 mod space;
 mod submitting;

@@ -147,6 +147,29 @@ pub struct JobRow {
     pub class: Option<String>,
 }
 
+/// What changes most of a job that is not settled.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JobHead {
+    /// Its name on the farm.
+    pub id: JobId,
+    /// Changes with every change of state, reason or priority.
+    pub version: u64,
+    /// Where it is in its life.
+    pub state: JobState,
+    /// Batches that were brought.
+    pub brought: u64,
+    /// Checkpoints taken.
+    pub looks: u32,
+    /// Whether nobody has the right to append to its sums now.
+    pub free: bool,
+    /// How far the picture is.
+    pub progress: Progress,
+}
+
+/// The right to append to a job's sums: counted up when it is given to somebody else.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Mandate(pub u64);
+
 /// What is in a picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Progress {
@@ -189,6 +212,8 @@ pub struct JobChange {
 /// The last form of a job that is over.
 #[derive(Clone, Debug)]
 pub struct Settlement {
+    /// Of whom settles it.
+    pub mandate: Mandate,
     /// What is in the picture that is kept.
     pub progress: Progress,
     /// The set of batches in it; `None` where there is no picture.
@@ -212,6 +237,26 @@ pub struct Ledger {
     pub snapshots: Vec<(Lane, u32)>,
     /// Checkpoints taken.
     pub checkpoints: u32,
+    /// How many were brought, of which some may be in the blobs of sums.
+    pub brought: u64,
+}
+
+/// What of a job can be handed out.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Unclaimed {
+    /// The next block of each lane.
+    pub cursors: Vec<(Lane, u32)>,
+    /// Blocks behind the cursors that nobody holds and nobody brought.
+    pub returned: Vec<BatchKey>,
+}
+
+/// What was brought of a job since some time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Brought {
+    /// Which.
+    pub rows: Vec<CommitRow>,
+    /// How many were brought by then, since the job began.
+    pub count: u64,
 }
 
 /// A batch to hand out.

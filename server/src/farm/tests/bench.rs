@@ -3,7 +3,7 @@
 use crate::{
     blobs::Blobs,
     farm::{Farm, picture::ExrFile, rules::Rules, scene::Inspect},
-    store::sqlite::Sqlite,
+    store::sql::Sql,
 };
 use bytes::Bytes;
 use ovtigre_core::film::{
@@ -19,7 +19,7 @@ use ovtigre_proto::{
     scene::{SceneContent, SceneContents},
     status::{JobState, JobStatus},
 };
-use std::{sync::Arc, time::Duration};
+use std::{path::Path, sync::Arc, time::Duration};
 use tempfile::TempDir;
 
 /// Spread of the made-up samples around 1.
@@ -46,9 +46,13 @@ pub(crate) fn rules() -> Rules {
 }
 
 async fn open(folder: &TempDir, rules: Rules) -> Arc<Farm> {
-    let store = Arc::new(Sqlite::open(&folder.path().join("farm.sqlite")).await.unwrap());
+    let store = Arc::new(Sql::file(&folder.path().join("farm.sqlite")).await.unwrap());
     let blobs = Blobs::folder(&folder.path().join("blobs")).unwrap();
-    let inspect = Inspect::new(|bytes| {
+    Farm::open(store, blobs, inspect(), rules).await.unwrap()
+}
+
+fn inspect() -> Inspect {
+    Inspect::new(|bytes| {
         if bytes.starts_with(b"bad") {
             return Err(crate::farm::error::fault("/meshes/0", "the mesh is bad"));
         }
@@ -58,14 +62,27 @@ async fn open(folder: &TempDir, rules: Rules) -> Arc<Farm> {
         let cameras = vec!["front".to_owned(), "side".to_owned()];
         let camera_aspect_ratios = vec![Some(2.0), None];
         Ok(SceneContent::Scene(SceneContents { cameras, camera_aspect_ratios, ..SceneContents::default() }))
-    });
-    Farm::open(store, blobs, inspect, rules).await.unwrap()
+    })
 }
 
 impl Bench {
     pub(crate) async fn new(rules: Rules) -> Self {
         let folder = tempfile::tempdir().unwrap();
         Self { farm: open(&folder, rules.clone()).await, rules, folder }
+    }
+
+    /// One of several farms over a database and a folder.
+    pub(crate) async fn replica(database: &str, folder: &Path, rules: Rules) -> Self {
+        let store = Arc::new(Sql::server(database).await.unwrap());
+        let blobs = Blobs::folder(folder).unwrap();
+        let farm = Farm::open(store, blobs, inspect(), rules.clone()).await.unwrap();
+        Self { farm, rules, folder: tempfile::tempdir().unwrap() }
+    }
+
+    /// As if the process was killed: nothing is waited for, and nothing given up.
+    pub(crate) async fn die(self) {
+        self.farm.stopping.cancel();
+        self.farm.store.close().await;
     }
 
     /// As after the process was killed: nothing is waited for.
@@ -95,7 +112,7 @@ impl Bench {
             ..JobRequest::default()
         };
         change(&mut request);
-        self.farm.submit(request, None).await.unwrap().id
+        self.farm.submit(request, None, None).await.unwrap().id
     }
 
     pub(crate) async fn worker(&self) -> WorkerId {
@@ -189,6 +206,12 @@ impl Bench {
         let layers = read_layers(&self.exr(job).await).unwrap();
         let bits = |values: Vec<f32>| values.into_iter().map(f32::to_bits).collect();
         layers.channels.into_iter().map(|(name, values)| (name, bits(values))).collect()
+    }
+
+    /// Asserts that nothing is kept of the job but its picture.
+    pub(crate) fn assert_only_a_picture(&self, job: &JobId) {
+        let files = self.files(job);
+        assert!(files.len() == 1 && files[0].starts_with("result-"), "{files:?}");
     }
 
     /// Files under `jobs/`.

@@ -28,7 +28,7 @@ async fn a_farm_without_room_takes_nothing_new_and_goes_on_when_there_is_room() 
     assert!(bench.take(&worker, 4).await.is_empty(), "no batches are handed out");
     assert!(matches!(bench.farm.receive().await, Err(FarmError::Full)));
     let request = JobRequest { scene: Some(ovtigre_proto::id::BlobId::of([1; 32])), ..JobRequest::default() };
-    assert!(matches!(bench.farm.submit(request, None).await, Err(FarmError::Full)));
+    assert!(matches!(bench.farm.submit(request, None, None).await, Err(FarmError::Full)));
     assert_eq!(bench.bring(&held[0], Spread::Noisy).await, Commit::Accepted, "the reserve is for these");
     set(40).await;
     let sum = super::bench::layered(&held[1], Spread::Noisy);

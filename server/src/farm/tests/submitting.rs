@@ -74,12 +74,12 @@ async fn the_same_request_under_the_same_key_is_one_job() {
     let bench = Bench::new(rules()).await;
     let request = JobRequest { scene: Some(bench.scene().await), ..JobRequest::default() };
     let key = || Some("k1".to_owned());
-    let first = bench.farm.submit(request.clone(), key()).await.unwrap();
-    let again = bench.farm.submit(request.clone(), key()).await.unwrap();
+    let first = bench.farm.submit(request.clone(), key(), None).await.unwrap();
+    let again = bench.farm.submit(request.clone(), key(), None).await.unwrap();
     assert_eq!(first.id, again.id);
     let other = JobRequest { seed: Some(1), ..request.clone() };
-    assert!(matches!(bench.farm.submit(other, key()).await, Err(FarmError::KeyTaken)));
-    assert_ne!(bench.farm.submit(request, Some("k2".to_owned())).await.unwrap().id, first.id);
+    assert!(matches!(bench.farm.submit(other, key(), None).await, Err(FarmError::KeyTaken)));
+    assert_ne!(bench.farm.submit(request, Some("k2".to_owned()), None).await.unwrap().id, first.id);
 }
 
 #[tokio::test]
