@@ -1,17 +1,19 @@
 //! A farm that listens: store, blobs, rules and doors put together.
 
 use crate::{
-    api::router,
+    api::{guard::Guarding, router},
     blobs::{BlobError, Blobs},
     farm::{Farm, error::FarmError, rules::Rules},
     inspect::inspect,
     store::{Store, error::StoreError, sql::Sql},
+    tls::{TlsListener, acceptor},
 };
+use axum::{Router, serve::Listener};
 use ovtigre_core::gltf::limits::Limits;
 use std::{
     fs::{File, TryLockError},
     io,
-    net::SocketAddr,
+    net::{Ipv4Addr, SocketAddr},
     path::{Path, PathBuf},
     sync::Arc,
     time::Duration,
@@ -33,6 +35,40 @@ pub struct ServeConfig {
     pub database: Option<String>,
     /// A bucket, `s3://bucket/prefix`, instead of files in the folder.
     pub blobs: Option<String>,
+    /// How long, how many, how much.
+    pub rules: Rules,
+    /// Who is let in.
+    pub guarding: Guarding,
+    /// Files of a certificate chain and its key: callers encrypt.
+    pub tls: Option<(PathBuf, PathBuf)>,
+    /// Whether it listens on a port of this machine, too, for workers of its own: without encryption.
+    pub own_port: OwnPort,
+}
+
+/// Whether a farm listens on a free port of this machine, too.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum OwnPort {
+    /// It does.
+    Yes,
+    /// It does not.
+    #[default]
+    No,
+}
+
+impl ServeConfig {
+    /// All in a folder, for callers of this machine.
+    pub fn new(listen: SocketAddr, data: PathBuf) -> Self {
+        Self {
+            listen,
+            data,
+            database: None,
+            blobs: None,
+            rules: Rules::default(),
+            guarding: Guarding::default(),
+            tls: None,
+            own_port: OwnPort::No,
+        }
+    }
 }
 
 /// Why a farm does not listen.
@@ -57,6 +93,9 @@ pub enum ServeError {
         /// Why.
         error: io::Error,
     },
+    /// The certificate or its key cannot be used.
+    #[error("cannot encrypt: {0}")]
+    Tls(String),
     /// The database cannot be used.
     #[error(transparent)]
     Store(#[from] StoreError),
@@ -73,15 +112,22 @@ pub enum ServeError {
 pub struct Serving {
     /// Where it listens.
     pub address: SocketAddr,
+    /// Where it listens for workers of its own, if elsewhere.
+    pub own: Option<SocketAddr>,
     farm: Arc<Farm>,
     closing: CancellationToken,
     server: JoinHandle<io::Result<()>>,
+    own_server: Option<JoinHandle<io::Result<()>>>,
     /// Held until the end: keeps others from the database in the data folder.
     _lock: Option<File>,
 }
 
 /// Opens database and blobs, takes up what was under way, and listens.
 pub async fn start(config: ServeConfig) -> Result<Serving, ServeError> {
+    let acceptor = match &config.tls {
+        Some((chain, key)) => Some(acceptor(chain, key).map_err(ServeError::Tls)?),
+        None => None,
+    };
     let lock = if config.database.is_none() { Some(lock(&config.data)?) } else { None };
     let listening = |error| ServeError::Listen { address: config.listen, error };
     let listener = TcpListener::bind(config.listen).await.map_err(listening)?;
@@ -95,13 +141,35 @@ pub async fn start(config: ServeConfig) -> Result<Serving, ServeError> {
         None => Blobs::folder(&config.data.join("blobs"))?,
     };
     blobs.ping().await?;
-    let farm = Farm::open(store, blobs, inspect(Limits::default()), Rules::default()).await?;
+    let farm = Farm::open(store, blobs, inspect(Limits::default()), config.rules).await?;
     let closing = CancellationToken::new();
-    let closed = closing.clone().cancelled_owned();
-    let server = axum::serve(listener, router(Arc::clone(&farm))).with_graceful_shutdown(closed);
-    let server = tokio::spawn(server.into_future());
+    let doors = router(Arc::clone(&farm), config.guarding);
+    let (mut own, mut own_server) = (None, None);
+    if config.own_port == OwnPort::Yes {
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).await.map_err(listening)?;
+        own = Some(listener.local_addr().map_err(listening)?);
+        own_server = Some(serve(listener, doors.clone(), &closing));
+    }
+    let server = match acceptor {
+        Some(acceptor) => serve(TlsListener::new(listener, acceptor).map_err(listening)?, doors, &closing),
+        None => serve(listener, doors, &closing),
+    };
     tracing::info!(%address, data = %config.data.display(), "farm listens");
-    Ok(Serving { address, farm, closing, server, _lock: lock })
+    Ok(Serving { address, own, farm, closing, server, own_server, _lock: lock })
+}
+
+fn serve<L>(listener: L, doors: Router, closing: &CancellationToken) -> JoinHandle<io::Result<()>>
+where
+    L: Listener<Addr = SocketAddr>,
+{
+    let closed = closing.clone().cancelled_owned();
+    tokio::spawn(axum::serve(listener, doors).with_graceful_shutdown(closed).into_future())
+}
+
+/// Bytes that are free on the disk of a folder.
+pub fn free_bytes(folder: &Path) -> Option<u64> {
+    let about = rustix::fs::statvfs(folder).ok()?;
+    Some(about.f_bavail.saturating_mul(about.f_frsize))
 }
 
 fn lock(folder: &Path) -> Result<File, ServeError> {
@@ -123,6 +191,9 @@ impl Serving {
         self.closing.cancel();
         // Ends event streams and waits for pictures.
         self.farm.stopping.cancel();
+        if let Some(own) = self.own_server {
+            own.abort();
+        }
         let abort = self.server.abort_handle();
         match tokio::time::timeout(LAST_REQUESTS, self.server).await {
             Ok(Ok(Ok(()))) => {}
@@ -147,8 +218,7 @@ mod tests {
     };
 
     fn config(data: &Path) -> ServeConfig {
-        let listen = ([127, 0, 0, 1], 0).into();
-        ServeConfig { listen, data: data.to_owned(), database: None, blobs: None }
+        ServeConfig::new(([127, 0, 0, 1], 0).into(), data.to_owned())
     }
 
     /// What comes until `end` is in it, or the connection ends.
@@ -169,7 +239,7 @@ mod tests {
     fn post(path: &str, kind: &str, body: &str) -> String {
         let length = body.len();
         format!(
-            "POST {path} HTTP/1.1\r\nhost: x\r\ncontent-type: {kind}\r\ncontent-length: {length}\r\n\r\n{body}"
+            "POST {path} HTTP/1.1\r\nhost: localhost\r\ncontent-type: {kind}\r\ncontent-length: {length}\r\n\r\n{body}"
         )
     }
 
@@ -190,7 +260,7 @@ mod tests {
         let (_, answer) = ask(farm.address, post("/v1/jobs", "application/json", &job), "\"warnings\"").await;
         assert!(answer.starts_with("HTTP/1.1 202"), "{answer}");
         let location = answer.lines().find_map(|line| line.strip_prefix("location: ")).unwrap().to_owned();
-        let listen = format!("GET {location}/events HTTP/1.1\r\nhost: x\r\n\r\n");
+        let listen = format!("GET {location}/events HTTP/1.1\r\nhost: localhost\r\n\r\n");
         let (mut stream, answer) = ask(farm.address, listen, "\"event\":\"status\"").await;
         assert!(answer.contains("text/event-stream"), "{answer}");
 
@@ -200,7 +270,7 @@ mod tests {
         read_until(&mut stream, "never").await;
 
         let farm = start(config(folder.path())).await.unwrap();
-        let get = format!("GET {location} HTTP/1.1\r\nhost: x\r\nconnection: close\r\n\r\n");
+        let get = format!("GET {location} HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\n\r\n");
         let (_, answer) = ask(farm.address, get, "never").await;
         assert!(answer.contains("\"queued\""), "{answer}");
         farm.stop().await;

@@ -163,7 +163,7 @@ fn assert_a_server_may_die(name: &str, dies: usize) {
     let folder = tempfile::tempdir().unwrap();
     let server = |n: usize| Farm::start_with(&folder.path().join(format!("farm-{n}")), &shared.flags());
     let mut farms = vec![server(0), server(1)];
-    let job = submit(&farms[0], folder.path(), &plain(), SAMPLES, &[]);
+    let job = submit(&farms[0], folder.path(), &room(), &plain(), SAMPLES, &[]);
     let (first, _second) = (farms[0].worker(), farms[1].worker());
     let then = farms[1].wait(&job, |j| batches(j) > 0);
     first.kill();
@@ -171,7 +171,7 @@ fn assert_a_server_may_die(name: &str, dies: usize) {
     farms.remove(dies).kill();
     farms.push(server(2));
     let (_third, _fourth) = (farms[0].worker(), farms[1].worker());
-    let expected = undisturbed(&plain(), SAMPLES).channels;
+    let expected = undisturbed(&room(), &plain(), SAMPLES).channels;
     for farm in &farms {
         let done = farm.wait(&job, |j| j["state"] == "done");
         assert_eq!((&done["invalid_samples"], &done["batches_done"]), (&0.into(), &done["batches_asked"]));

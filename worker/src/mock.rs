@@ -177,6 +177,7 @@ impl MockFarm {
     pub(crate) fn config(&self, cache: PathBuf) -> Config {
         Config {
             server: self.address.to_string(),
+            token: None,
             name: "test".to_owned(),
             threads: 2,
             tags: Vec::new(),

@@ -98,13 +98,11 @@ impl<'s> Vertex<'s> {
             return None;
         }
         // Put together apart, because a BSDF on its way from a variable costs a copy.
-        Some(match rules.even_bsdf(&at) {
-            Some(even) => Self { at, bsdf: Cow::Borrowed(even), wo, cos_back },
-            None => {
-                let surface = at.surface();
-                Self { at, bsdf: Cow::Owned(Bsdf::keeping(&surface, rules.letters)), wo, cos_back }
-            }
-        })
+        if let Some(even) = rules.even_bsdf(&at) {
+            return Some(Self { at, bsdf: Cow::Borrowed(even), wo, cos_back });
+        }
+        let surface = at.surface();
+        Some(Self { at, bsdf: Cow::Owned(Bsdf::keeping(&surface, rules.letters)), wo, cos_back })
     }
 
     /// Unit direction back along the path.

@@ -7,7 +7,10 @@ use super::{
     call::{Call, Payload, Repeat},
     error::{ClientError, innermost},
 };
-use reqwest::{Response, StatusCode, header::RETRY_AFTER};
+use reqwest::{
+    Response, StatusCode,
+    header::{AUTHORIZATION, HeaderValue, RETRY_AFTER},
+};
 use std::{
     sync::{
         Arc,
@@ -37,6 +40,7 @@ pub struct Client {
     address: Address,
     attempts: u32,
     seed: Arc<AtomicU64>,
+    token: Option<HeaderValue>,
 }
 
 impl Client {
@@ -59,7 +63,14 @@ impl Client {
             elsewhere = elsewhere.no_proxy();
         }
         let elsewhere = elsewhere.build().map_err(wrong)?;
-        Ok(Self { http, elsewhere, address, attempts: ATTEMPTS, seed: Arc::new(AtomicU64::new(seed)) })
+        Ok(Self {
+            http,
+            elsewhere,
+            address,
+            attempts: ATTEMPTS,
+            seed: Arc::new(AtomicU64::new(seed)),
+            token: None,
+        })
     }
 
     /// Puts bytes where the farm said, once: `patience` is how long that may take.
@@ -83,9 +94,32 @@ impl Client {
         self
     }
 
+    /// Shows `token` with each call.
+    #[must_use]
+    pub fn with_token(mut self, token: Option<&str>) -> Self {
+        let header = token.and_then(|token| HeaderValue::from_str(&format!("Bearer {}", token.trim())).ok());
+        self.token = header.map(|mut header| {
+            header.set_sensitive(true);
+            header
+        });
+        self
+    }
+
     /// Where the farm is.
     pub fn address(&self) -> &Address {
         &self.address
+    }
+
+    /// An error where the farm's address names a machine that nobody knows: no patience helps then.
+    pub async fn resolve(&self) -> Result<(), ClientError> {
+        let (host, port) = self.address.host_and_port();
+        let found = tokio::net::lookup_host((host.as_str(), port)).await.map(|mut found| found.next());
+        let reason = match found {
+            Ok(Some(_)) => return Ok(()),
+            Ok(None) => "its name leads nowhere".to_owned(),
+            Err(error) => error.to_string(),
+        };
+        Err(ClientError::Address { text: self.address.to_string(), reason })
     }
 
     /// A wait that starts short, its own for each use.
@@ -116,6 +150,9 @@ impl Client {
         let name = format!("{} {}", call.method, self.address.join(&call.route));
         let mut request = self.http.request(call.method.clone(), self.address.join(&call.route));
         request = request.headers(call.headers.clone()).query(&call.query);
+        if let Some(token) = &self.token {
+            request = request.header(AUTHORIZATION, token.clone());
+        }
         request = match &call.payload {
             Payload::Empty => request,
             Payload::Bytes(bytes) => request.body(bytes.clone()),

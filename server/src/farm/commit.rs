@@ -3,6 +3,7 @@
 use super::{
     Farm,
     append::blocking,
+    audit::Audit,
     counters::Fate,
     error::{FarmError, Result},
     ids::batch_of,
@@ -20,7 +21,7 @@ use ovtigre_core::{
 };
 use ovtigre_proto::{
     id::{BlobId, JobId, LeaseId, WorkerId},
-    lease::Commit,
+    lease::{Commit, FailureKind, LeaseFailure},
 };
 use std::{sync::Arc, time::Duration};
 
@@ -76,6 +77,7 @@ impl Farm {
         time: Duration,
         way: Way,
     ) -> Result<Commit> {
+        self.need_room_for_sums()?;
         let (job, key) = batch_of(lease).ok_or_else(|| FarmError::not_found("lease", lease))?;
         let row = self.store.job(&job).await?.ok_or_else(|| FarmError::not_found("lease", lease))?;
         let Some(live) = self.meet(&job).await?.filter(|_| !row.state.is_over()) else {
@@ -83,9 +85,16 @@ impl Farm {
             return Ok(Commit::NotNeeded);
         };
         let batch = live.batch(key).ok_or_else(|| FarmError::not_found("lease", lease))?;
-        let Decoded { sum, hash, solution } = self.decode(&live, batch, partial.clone()).await?;
+        let Decoded { sum, hash, solution } = match self.decode(&live, batch, partial.clone()).await {
+            Ok(decoded) => decoded,
+            Err(error) => return Err(self.refuse(lease, error).await),
+        };
         if let Some(json) = solution.filter(|_| live.spec.settings.method == Method::Radiosity) {
             self.keep_solution(&job, &json).await?;
+        }
+        let audit = self.book().end_audit(lease);
+        if let Some((row, audit)) = audit {
+            return self.compare(&live, key, &row.worker, audit, &hash).await;
         }
         let name = BlobName::Partial(job.clone(), key, hash.clone());
         match way {
@@ -104,9 +113,17 @@ impl Farm {
         match self.store.commit(new).await? {
             CommitOutcome::First => {
                 self.counters.count(Fate::Accepted);
-                self.book().brought(&job, key);
+                let failed = self.book().brought(&job, key);
                 if let Some(worker) = &worker {
                     self.crew().clear(worker);
+                    // What another could render was not the job's fault.
+                    for at_fault in failed.iter().filter(|other| *other != worker) {
+                        self.blame(at_fault, &job, "another worker could render what it could not").await?;
+                    }
+                    if self.is_audited(lease) {
+                        let audit = Audit { first: worker.clone(), second: None };
+                        self.book().audits.ask(job.clone(), key, audit);
+                    }
                 }
                 self.arrive(&live, row, sum);
                 Ok(Commit::Accepted)
@@ -130,6 +147,19 @@ impl Farm {
                 Err(FarmError::not_found("lease", lease))
             }
         }
+    }
+
+    /// A sum that cannot be used is its worker's fault, and the batch goes to another.
+    async fn refuse(&self, lease: &LeaseId, error: FarmError) -> FarmError {
+        if let FarmError::Sum(reason) = &error {
+            let failure =
+                LeaseFailure { reason: format!("its sum was refused: {reason}"), kind: FailureKind::Worker };
+            match self.give_back(lease, failure).await {
+                Ok(()) | Err(FarmError::NotFound { .. }) => {}
+                Err(error) => tracing::error!(%lease, %error, "a refused batch was not taken back"),
+            }
+        }
+        error
     }
 
     async fn decode(&self, live: &Live, batch: Batch, partial: Bytes) -> Result<Decoded> {

@@ -1,6 +1,7 @@
 //! Rules, no HTTP: submit, split, lease, commit, append, checkpoint, stop, reap.
 
 pub mod append;
+pub mod audit;
 pub mod book;
 pub mod checkpoint;
 pub mod commit;
@@ -9,7 +10,9 @@ pub mod counters;
 pub mod crew;
 pub mod curve;
 pub mod error;
+pub mod extend;
 pub mod ids;
+pub mod join;
 pub mod lease;
 pub mod live;
 pub mod mandates;
@@ -22,6 +25,7 @@ pub mod reap;
 pub mod rules;
 pub mod scene;
 pub mod solution;
+pub mod space;
 pub mod spec;
 pub mod split;
 pub mod status;
@@ -67,6 +71,7 @@ pub struct Farm {
     name: String,
     inspect: Inspect,
     ids: Ids,
+    fullness: space::Fullness,
     tasks: TaskTracker,
     decoders: tokio::sync::Semaphore,
     inspectors: tokio::sync::Semaphore,

@@ -47,6 +47,7 @@ impl Farm {
             counters: super::counters::Counters::default(),
             stopping: tokio_util::sync::CancellationToken::new(),
             inspect,
+            fullness: super::space::Fullness::default(),
             ids,
             tasks: tokio_util::task::TaskTracker::new(),
             decoders: Semaphore::new(processors),
@@ -55,6 +56,7 @@ impl Farm {
             crew: Mutex::default(),
             lives: Mutex::default(),
         });
+        farm.look_at_room();
         if farm.is_shared() {
             let farm = Arc::clone(&farm);
             farm.tasks.clone().spawn(async move {
@@ -128,10 +130,12 @@ impl Farm {
         let plan = Plan::new(schedule, ledger.cursors, ledger.returned, ledger.checkpoints);
         let hand_out = if row.state == JobState::Paused { HandOut::Paused } else { HandOut::Yes };
         let settings = live.spec.settings.clone();
-        let entry = book::Entry::new(row.scene.clone(), settings, plan, row.priority, row.sequence, hand_out);
+        let wants = live.spec.wants(row.class.clone());
+        let order = (row.priority, row.sequence);
+        let entry = book::Entry::new(row.scene.clone(), settings, plan, order, hand_out, wants);
         let mut book = self.book();
         book.add(row.id.clone(), entry);
-        ledger.leases.into_iter().for_each(|lease| book.hold(lease));
+        ledger.leases.into_iter().for_each(|lease| book.hold(lease, None));
         Ok(())
     }
 }

@@ -4,10 +4,11 @@ use super::{
     Farm,
     error::Result,
     live::{Arrival, Ending, Live, Waits},
+    open::read_spec,
 };
 use crate::store::{
     Sharing,
-    row::{BatchKey, JobHead},
+    row::{BatchKey, JobHead, JobRow},
 };
 use ovtigre_proto::id::JobId;
 use std::{
@@ -72,9 +73,13 @@ impl Farm {
         Ok(())
     }
 
-    async fn follow_head(&self, live: &Arc<Live>, head: &JobHead) -> Result<()> {
+    async fn follow_head(self: &Arc<Self>, live: &Arc<Live>, head: &JobHead) -> Result<()> {
         if live.note_version(head.version) {
-            self.follow(&self.job_row(&head.id).await?);
+            let row = self.job_row(&head.id).await?;
+            if read_spec(&row)? != live.spec {
+                return self.follow_spec(live, &row).await;
+            }
+            self.follow(&row);
         }
         if head.state.is_over() && live.ending().is_none() {
             self.book().remove(&live.id);
@@ -97,6 +102,15 @@ impl Farm {
             });
         }
         Ok(())
+    }
+
+    /// Another server changed what is asked of a job.
+    async fn follow_spec(self: &Arc<Self>, live: &Live, row: &JobRow) -> Result<()> {
+        let _held = live.merge.lock().await;
+        self.book().remove(&live.id);
+        self.forget_live(&live.id);
+        live.kick.notify_one();
+        self.take_up(row).await
     }
 
     /// Batches that were brought to other servers.

@@ -141,11 +141,11 @@ impl Farm {
     /// The picture so far, and the set of batches in it.
     pub async fn exr(&self, id: &JobId) -> Result<(String, ExrFile)> {
         let row = self.job_row(id).await?;
-        if let (true, Some(manifest)) = (row.settled, row.manifest) {
+        if let (true, Some(manifest)) = (row.settled, row.manifest.clone()) {
             let (name, size) = self.kept(id, &manifest).await?;
             return Ok((manifest, ExrFile::Kept { name, size }));
         }
-        let live = self.live(id).filter(|_| !row.settled).ok_or_else(|| FarmError::NoPicture(id.clone()))?;
+        let live = self.live(id).filter(|_| !row.settled).ok_or_else(|| FarmError::no_picture(&row))?;
         let made = self.make_exr(&live).await?;
         Ok((made.manifest, ExrFile::Memory(made.bytes)))
     }
@@ -216,7 +216,7 @@ impl Farm {
             let png = blocking(move || develop_kept(&exr, region, &prefix, &develop)).await??;
             return Ok((manifest.clone(), png));
         }
-        let live = self.live(id).filter(|_| !row.settled).ok_or_else(|| FarmError::NoPicture(id.clone()))?;
+        let live = self.live(id).filter(|_| !row.settled).ok_or_else(|| FarmError::no_picture(&row))?;
         let held = self.sums(&live).await?;
         let manifest = held.as_ref().and_then(|merge| merge.manifest(&live.identity));
         let manifest = manifest.ok_or_else(|| FarmError::NoPicture(id.clone()))?;

@@ -8,8 +8,11 @@ use super::{
     open::UPLOAD_MAX,
 };
 use crate::{blobs::BlobFolder, store::error::StoreError};
-use ovtigre_proto::status::JobState;
-use std::{sync::Arc, time::Duration};
+use ovtigre_proto::{lease::FailureKind, status::JobState};
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 /// How long a job rests after its store or its files failed.
 const REST: Duration = Duration::from_secs(1);
@@ -17,13 +20,17 @@ const REST: Duration = Duration::from_secs(1);
 impl Farm {
     /// Leases that ran out go back, silent workers are lost, jobs whose time is over end.
     pub async fn reap(&self) -> Result<()> {
+        self.look_at_room();
         for released in self.store.expire().await? {
             self.counters.count(Fate::Expired);
             self.book().take_back(&released.lease);
             if let Some(live) = self.live(&released.lease.job) {
                 live.changed();
             }
-            self.judge(&released, "its worker was not heard of in time").await?;
+            self.judge(&released, FailureKind::HandedBack, "its worker was not heard of in time").await?;
+        }
+        if let Some(before) = Instant::now().checked_sub(self.rules.lease) {
+            self.drop_audits(before, None);
         }
         for worker in self.store.lose_workers(self.rules.silence).await? {
             tracing::warn!(%worker, "worker is lost");

@@ -1,5 +1,6 @@
 //! A job, resolved: what is kept of it in the store's `spec`.
 
+use super::book::Wants;
 use ovtigre_core::{
     film::{
         schedule::Schedule,
@@ -28,6 +29,12 @@ pub struct JobSpec {
     pub error_target: Option<f64>,
     /// Seconds of run time to stop after.
     pub seconds: Option<f64>,
+    /// Version of the program whose workers render it; any where it is empty.
+    #[serde(default)]
+    pub build: String,
+    /// The id of the token that sent it.
+    #[serde(default)]
+    pub owner: Option<String>,
     /// Why the method was chosen.
     pub method_reason: String,
     /// Paths that are asked for and that no technique of the method makes.
@@ -38,6 +45,17 @@ pub struct JobSpec {
 }
 
 impl JobSpec {
+    /// Who may render it; `class` is that of the processors that began it.
+    pub fn wants(&self, class: Option<String>) -> Wants {
+        Wants {
+            build: self.build.clone(),
+            class,
+            tags: self.request.tags.clone(),
+            max_workers: self.request.max_workers,
+            weight: self.request.weight.unwrap_or(1).max(1),
+        }
+    }
+
     /// Its batches.
     pub fn schedule(&self) -> Schedule {
         let Settings { method, replicates, .. } = self.settings;

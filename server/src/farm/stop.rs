@@ -31,6 +31,10 @@ impl Farm {
             let Made { manifest, bytes } = self.make_exr(live).await?;
             self.blobs.put(&BlobName::Result(live.id.clone(), manifest), bytes).await?;
         }
+        match ending.state {
+            JobState::Done => self.keep_sums(live).await?,
+            _ => self.drop_sums(live).await?,
+        }
         let settlement = Settlement { mandate, progress, manifest, certified: ending.certified };
         let change = |row: &JobRow| {
             let over = row.state.is_over();
@@ -70,15 +74,18 @@ impl Farm {
                 settlement: Some(settlement.clone()),
             })
         };
+        self.drop_sums(live).await?;
         self.change(&live.id, change).await?;
         self.forget_live(&live.id);
         self.remove_leftovers(&live.id).await
     }
 
-    /// Removes partials and sums of a job that is over.
+    /// Removes partials of a job that is over, and its sums unless they are kept.
     pub(super) async fn remove_leftovers(&self, id: &JobId) -> Result<()> {
         self.blobs.delete_all(&BlobFolder::Partials(id.clone())).await?;
-        self.blobs.delete_all(&BlobFolder::Prefixes(id.clone())).await?;
+        if self.store.ledger(id).await?.snapshots.is_empty() {
+            self.blobs.delete_all(&BlobFolder::Prefixes(id.clone())).await?;
+        }
         Ok(())
     }
 

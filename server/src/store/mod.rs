@@ -18,9 +18,9 @@ use ovtigre_proto::{
     status::WorkerState,
 };
 use row::{
-    Added, BatchKey, Brought, Claim, CommitOutcome, CommitRow, Counts, IdempotencyKey, JobChange, JobFilter,
-    JobHead, JobRow, Lane, Ledger, Mandate, NewCheckpoint, NewCommit, NewJob, Progress, Released, SceneRow,
-    Unclaimed, WorkerRow,
+    Added, BatchKey, Brought, Claim, CommitOutcome, CommitRow, Counts, Extension, IdempotencyKey, JobChange,
+    JobFilter, JobHead, JobRow, Lane, Ledger, Mandate, NewCheckpoint, NewCommit, NewJob, Progress, Released,
+    SceneRow, TokenRow, Unclaimed, WorkerRow,
 };
 use std::{fmt, ops::Range, time::Duration};
 
@@ -117,6 +117,31 @@ pub trait Store: Send + Sync + fmt::Debug {
     async fn lose_workers(&self, time: Duration) -> Result<Vec<WorkerId>>;
     /// Workers that hold a batch of the job.
     async fn workers_of(&self, job: &JobId) -> Result<u32>;
+
+    /// Forgets what was brought of `batches`, which are handed out again unless the job is over, and that
+    /// `lanes` are kept as one blob.
+    async fn uncommit(&self, job: &JobId, batches: Vec<BatchKey>, lanes: Vec<Lane>) -> Result<()>;
+    /// Whoever appends to the job's sums has to read them again: what was brought has changed.
+    async fn free_merge(&self, job: &JobId) -> Result<()>;
+    /// Batches that a worker brought of jobs that are not over.
+    async fn commits_by(&self, worker: &WorkerId) -> Result<Vec<(JobId, BatchKey)>>;
+    /// Pins a job to a class of processors unless it is pinned; says to which it is.
+    async fn pin_job(&self, id: &JobId, class: &str) -> Result<Option<String>>;
+    /// Gives a job that still has `version` another specification, and counts it up; false where it has
+    /// not. One that is over goes on at what is kept of each lane as a blob; what was brought or handed out
+    /// past the blocks that both specifications have is forgotten.
+    async fn extend_job(&self, id: &JobId, version: u64, to: Extension) -> Result<bool>;
+    /// A worker gets no more batches, and why; false where there is none.
+    async fn set_aside(&self, worker: &WorkerId, reason: &str) -> Result<bool>;
+
+    /// Adds a token.
+    async fn add_token(&self, token: TokenRow) -> Result<()>;
+    /// All tokens, the oldest first.
+    async fn tokens(&self) -> Result<Vec<TokenRow>>;
+    /// The token whose hash that is.
+    async fn token(&self, hash: &BlobId) -> Result<Option<TokenRow>>;
+    /// Forgets a token; false where there was none.
+    async fn remove_token(&self, id: &str) -> Result<bool>;
 
     /// Forgets idempotency keys older than `age`.
     async fn forget_keys(&self, age: Duration) -> Result<()>;

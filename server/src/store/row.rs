@@ -143,6 +143,8 @@ pub struct JobRow {
     pub manifest: Option<String>,
     /// Whether it is over and its files have their last form.
     pub settled: bool,
+    /// The class of processors whose bits its sums have, once its first batch was handed out.
+    pub class: Option<String>,
 }
 
 /// What changes most of a job that is not settled.
@@ -363,6 +365,8 @@ pub struct WorkerRow {
     pub failures: u64,
     /// Rays a second, over its last batch.
     pub rays_per_second: f64,
+    /// Why it was put aside.
+    pub reason: Option<String>,
 }
 
 /// A checkpoint, and how far the picture is at it.
@@ -376,6 +380,73 @@ pub struct NewCheckpoint {
     pub layers: Vec<LayerError>,
     /// What is in the picture.
     pub progress: Progress,
+}
+
+/// Another specification of a job.
+#[derive(Clone, Debug)]
+pub struct Extension {
+    /// The farm's own document.
+    pub spec: String,
+    /// Leading blocks that both specifications have.
+    pub whole: u32,
+    /// Leading checkpoints that both have and that stay.
+    pub looks: u32,
+    /// Number of regions.
+    pub regions: u32,
+    /// Number of sequences of samples a region.
+    pub replicates: u32,
+}
+
+/// Who may call. The token itself is not kept.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TokenRow {
+    /// Its name on the farm.
+    pub id: String,
+    /// A name for people.
+    pub name: String,
+    /// What it may do.
+    pub role: Role,
+    /// Hash of the token.
+    pub hash: BlobId,
+    /// When it was made; `None` before it is kept.
+    pub created_at: Option<Timestamp>,
+}
+
+/// What a caller may do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Role {
+    /// All of it.
+    Admin,
+    /// To submit jobs, to change them, and all that `Read` may.
+    Submit,
+    /// To look.
+    Read,
+    /// To join as a worker, and to work.
+    Work,
+}
+
+impl Role {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Admin, Self::Submit, Self::Read, Self::Work];
+
+    /// As it is written.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Admin => "admin",
+            Self::Submit => "submit",
+            Self::Read => "read",
+            Self::Work => "work",
+        }
+    }
+}
+
+impl std::str::FromStr for Role {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        let found = Self::ALL.into_iter().find(|role| role.name() == text);
+        found.ok_or_else(|| format!("'{text}' is no role: there are admin, submit, read and work"))
+    }
 }
 
 /// Numbers for gauges.

@@ -42,7 +42,7 @@ pub(crate) struct Bench {
 
 /// Fast enough for tests, else as always.
 pub(crate) fn rules() -> Rules {
-    Rules { tick: Duration::from_millis(10), rest: Duration::ZERO, ..Rules::default() }
+    Rules { tick: Duration::from_millis(10), rest: Duration::ZERO, kept_sums_bytes: 0, ..Rules::default() }
 }
 
 async fn open(folder: &TempDir, rules: Rules) -> Arc<Farm> {
@@ -68,14 +68,14 @@ fn inspect() -> Inspect {
 impl Bench {
     pub(crate) async fn new(rules: Rules) -> Self {
         let folder = tempfile::tempdir().unwrap();
-        Self { farm: open(&folder, rules).await, rules, folder }
+        Self { farm: open(&folder, rules.clone()).await, rules, folder }
     }
 
     /// One of several farms over a database and a folder.
     pub(crate) async fn replica(database: &str, folder: &Path, rules: Rules) -> Self {
         let store = Arc::new(Sql::server(database).await.unwrap());
         let blobs = Blobs::folder(folder).unwrap();
-        let farm = Farm::open(store, blobs, inspect(), rules).await.unwrap();
+        let farm = Farm::open(store, blobs, inspect(), rules.clone()).await.unwrap();
         Self { farm, rules, folder: tempfile::tempdir().unwrap() }
     }
 
@@ -89,7 +89,7 @@ impl Bench {
     pub(crate) async fn crash(self) -> Self {
         self.farm.stopping.cancel();
         self.farm.store.close().await;
-        let farm = open(&self.folder, self.rules).await;
+        let farm = open(&self.folder, self.rules.clone()).await;
         Self { farm, ..self }
     }
 
@@ -112,17 +112,22 @@ impl Bench {
             ..JobRequest::default()
         };
         change(&mut request);
-        self.farm.submit(request, None).await.unwrap().id
+        self.farm.submit(request, None, None).await.unwrap().id
     }
 
     pub(crate) async fn worker(&self) -> WorkerId {
-        let join = WorkerJoin {
+        self.worker_as(|_| ()).await
+    }
+
+    pub(crate) async fn worker_as(&self, change: impl FnOnce(&mut WorkerJoin)) -> WorkerId {
+        let mut join = WorkerJoin {
             name: "test".to_owned(),
             threads: 1,
-            build: "0".to_owned(),
+            build: env!("CARGO_PKG_VERSION").to_owned(),
             instruction_set: "any".to_owned(),
             tags: Vec::new(),
         };
+        change(&mut join);
         self.farm.join(join).await.unwrap().id
     }
 
@@ -209,21 +214,24 @@ impl Bench {
         assert!(files.len() == 1 && files[0].starts_with("result-"), "{files:?}");
     }
 
-    /// Files under `jobs/`, by the end of their names.
-    pub(crate) fn files(&self, job: &JobId) -> Vec<String> {
+    /// Files under `jobs/`.
+    pub(crate) fn paths(&self, job: &JobId) -> Vec<std::path::PathBuf> {
         let mut folders = vec![self.folder.path().join("blobs/jobs").join(job.as_str())];
         let mut files = Vec::new();
         while let Some(folder) = folders.pop() {
             for entry in std::fs::read_dir(folder).into_iter().flatten() {
                 let path = entry.unwrap().path();
-                if path.is_dir() {
-                    folders.push(path);
-                } else {
-                    files.push(path.file_name().unwrap().to_str().unwrap().to_owned());
-                }
+                if path.is_dir() { folders.push(path) } else { files.push(path) }
             }
         }
+        files.sort();
         files
+    }
+
+    /// Files under `jobs/`, by the end of their names.
+    pub(crate) fn files(&self, job: &JobId) -> Vec<String> {
+        let name = |path: &std::path::PathBuf| path.file_name().unwrap().to_str().unwrap().to_owned();
+        self.paths(job).iter().map(name).collect()
     }
 }
 

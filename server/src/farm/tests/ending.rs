@@ -98,7 +98,7 @@ async fn a_job_cancelled_before_its_first_batch_has_no_picture() {
     let job = bench.job(100, |_| ()).await;
     bench.farm.cancel(&job).await.unwrap();
     bench.until_settled(&job, JobState::Cancelled).await;
-    assert!(matches!(bench.farm.exr(&job).await, Err(crate::farm::error::FarmError::NoPicture(_))));
+    assert!(matches!(bench.farm.exr(&job).await, Err(crate::farm::error::FarmError::NeverPicture(_))));
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -89,12 +89,19 @@ pub(super) fn worker_state_name(state: WorkerState) -> &'static str {
         WorkerState::Draining => "draining",
         WorkerState::Lost => "lost",
         WorkerState::Gone => "gone",
+        WorkerState::Aside => "aside",
     }
 }
 
 /// A worker's state by its name.
 pub(super) fn worker_state(text: &str) -> Result<WorkerState> {
-    let all = [WorkerState::Active, WorkerState::Draining, WorkerState::Lost, WorkerState::Gone];
+    let all = [
+        WorkerState::Active,
+        WorkerState::Draining,
+        WorkerState::Lost,
+        WorkerState::Gone,
+        WorkerState::Aside,
+    ];
     all.into_iter()
         .find(|s| worker_state_name(*s) == text)
         .ok_or_else(|| StoreError::damaged("worker state", text))

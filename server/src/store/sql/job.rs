@@ -141,6 +141,7 @@ fn read(row: &Row, now: i64) -> Result<JobRow> {
         certified: row.truth("certified")?,
         manifest: row.text_or_none("manifest")?,
         settled: row.truth("settled")?,
+        class: row.text_or_none("class")?,
     })
 }
 
@@ -206,13 +207,17 @@ async fn forget(db: &mut Db, id: &JobId, kept: Kept) -> Result<()> {
         "DELETE FROM failure WHERE job = $1",
     ];
     let sums: &[&'static str] = &[
-        "DELETE FROM commits WHERE job = $1",
+        // What is in sums that are kept for more samples stays.
+        "DELETE FROM commits WHERE job = $1 AND NOT EXISTS (SELECT 1 FROM snapshot WHERE snapshot.job = $1)",
         "DELETE FROM disagreement WHERE job = $1",
-        "DELETE FROM snapshot WHERE job = $1",
         "DELETE FROM merger WHERE job = $1",
     ];
-    let shown: &[&'static str] =
-        &["DELETE FROM checkpoint WHERE job = $1", "DELETE FROM idempotency WHERE job = $1"];
+    let shown: &[&'static str] = &[
+        "DELETE FROM snapshot WHERE job = $1",
+        "DELETE FROM commits WHERE job = $1",
+        "DELETE FROM checkpoint WHERE job = $1",
+        "DELETE FROM idempotency WHERE job = $1",
+    ];
     let sums = if kept >= Kept::Curve { sums } else { &[] };
     let shown = if kept >= Kept::Nothing { shown } else { &[] };
     for sql in flight.iter().chain(sums).chain(shown) {

@@ -6,6 +6,7 @@
 mod column;
 mod commit;
 mod connection;
+mod control;
 mod job;
 mod ledger;
 mod merger;
@@ -20,9 +21,9 @@ use super::{
     Sharing, Store,
     error::{Result, StoreError},
     row::{
-        Added, BatchKey, Brought, Claim, CommitOutcome, CommitRow, Counts, IdempotencyKey, JobChange,
-        JobFilter, JobHead, JobRow, Lane, Ledger, Mandate, NewCheckpoint, NewCommit, NewJob, Progress,
-        Released, SceneRow, Unclaimed, WorkerRow,
+        Added, BatchKey, Brought, Claim, CommitOutcome, CommitRow, Counts, Extension, IdempotencyKey,
+        JobChange, JobFilter, JobHead, JobRow, Lane, Ledger, Mandate, NewCheckpoint, NewCommit, NewJob,
+        Progress, Released, SceneRow, TokenRow, Unclaimed, WorkerRow,
     },
 };
 use connection::Db;
@@ -51,6 +52,11 @@ impl Sql {
         let store = Self::open(Source::file(path), Sharing::Alone).await?;
         store.writer.write(|db| Box::pin(merger::free_all(db))).await?;
         Ok(store)
+    }
+
+    /// Opens a file of SQLite beside the process whose file it is.
+    pub async fn beside(path: &Path) -> Result<Self> {
+        Self::open(Source::file(path), Sharing::Alone).await
     }
 
     /// Connects to a PostgreSQL server, `postgres://user:password@host:port/database`, and brings its
@@ -253,6 +259,56 @@ impl Store for Sql {
 
     async fn workers_of(&self, job: &JobId) -> Result<u32> {
         ledger::workers_of(&mut self.reader().await?, job).await
+    }
+
+    async fn uncommit(&self, job: &JobId, batches: Vec<BatchKey>, lanes: Vec<Lane>) -> Result<()> {
+        let job = job.clone();
+        self.writer
+            .write(move |db| Box::pin(async move { control::uncommit(db, &job, batches, lanes).await }))
+            .await
+    }
+
+    async fn commits_by(&self, worker: &WorkerId) -> Result<Vec<(JobId, BatchKey)>> {
+        control::commits_by(&mut self.reader().await?, worker).await
+    }
+
+    async fn pin_job(&self, id: &JobId, class: &str) -> Result<Option<String>> {
+        let (id, class) = (id.clone(), class.to_owned());
+        self.writer.write(move |db| Box::pin(async move { control::pin_job(db, &id, &class).await })).await
+    }
+
+    async fn extend_job(&self, id: &JobId, version: u64, to: Extension) -> Result<bool> {
+        let id = id.clone();
+        self.writer
+            .write(move |db| Box::pin(async move { control::extend_job(db, &id, version, to).await }))
+            .await
+    }
+
+    async fn set_aside(&self, worker: &WorkerId, reason: &str) -> Result<bool> {
+        let (id, reason) = (worker.clone(), reason.to_owned());
+        self.writer.write(move |db| Box::pin(async move { control::set_aside(db, &id, &reason).await })).await
+    }
+
+    async fn add_token(&self, token: TokenRow) -> Result<()> {
+        self.writer.write(|db| Box::pin(control::add_token(db, token))).await
+    }
+
+    async fn tokens(&self) -> Result<Vec<TokenRow>> {
+        control::tokens(&mut self.reader().await?).await
+    }
+
+    async fn token(&self, hash: &BlobId) -> Result<Option<TokenRow>> {
+        control::token(&mut self.reader().await?, hash).await
+    }
+
+    async fn remove_token(&self, id: &str) -> Result<bool> {
+        let id = id.to_owned();
+        self.writer.write(move |db| Box::pin(async move { control::remove_token(db, &id).await })).await
+    }
+
+    async fn free_merge(&self, job: &JobId) -> Result<()> {
+        let job = job.clone();
+        self.writer.write(move |db| Box::pin(async move { control::free_merge(db, &job).await })).await
     }
 
     async fn forget_keys(&self, age: Duration) -> Result<()> {

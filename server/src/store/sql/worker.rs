@@ -28,7 +28,7 @@ pub(super) async fn see(db: &mut Db, id: &WorkerId, state: WorkerState) -> Resul
     let now = db.now().await?;
     let seen = query(
         "UPDATE worker SET seen_ms = $1,
-                state = CASE WHEN state = 'gone' OR (state = 'draining' AND $2 = 'active') THEN state ELSE $2 END
+                state = CASE WHEN state = 'gone' OR (state IN ('draining', 'aside') AND $2 = 'active') THEN state ELSE $2 END
          WHERE id = $3 RETURNING state",
     );
     let row = db.first(seen.bind(now).bind(worker_state_name(state)).bind(id.as_str())).await?;
@@ -83,6 +83,7 @@ fn read(row: &Row) -> Result<WorkerRow> {
         batches_done: count(row, "batches_done")?,
         failures: count(row, "failures")?,
         rays_per_second: row.real("rays_per_second")?,
+        reason: row.text_or_none("reason")?,
     })
 }
 
