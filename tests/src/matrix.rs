@@ -69,6 +69,26 @@ pub fn coated() -> Case {
     case("coated", glb)
 }
 
+/// A clear coat over metal, sheen over plastic, and a leaf that light goes through.
+pub fn layers() -> Case {
+    let glb = room(10.0, |glb| {
+        let mut coated = metal(0.5);
+        coated["extensions"] = json!({"KHR_materials_clearcoat":
+            {"clearcoatFactor": 1.0, "clearcoatRoughnessFactor": 0.3}});
+        smooth_sphere(glb, coated, Vec3::new(-0.5, -0.5, 0.2), 0.4);
+        let mut cloth = plastic(0.8);
+        cloth["extensions"] = json!({"KHR_materials_sheen":
+            {"sheenColorFactor": [0.9, 0.6, 0.3], "sheenRoughnessFactor": 0.4}});
+        smooth_sphere(glb, cloth, Vec3::new(0.5, -0.5, 0.2), 0.4);
+        let mut leaf = plastic(0.5);
+        leaf["extensions"] = json!({"KHR_materials_diffuse_transmission":
+            {"diffuseTransmissionFactor": 0.7, "diffuseTransmissionColorFactor": [0.4, 0.9, 0.3]}});
+        let at = |x: f32, y: f32| Vec3::new(x, y, 0.0);
+        glb.body(leaf, quad([at(-0.5, 0.2), at(0.5, 0.2), at(0.5, 0.8), at(-0.5, 0.8)]));
+    });
+    case("layers", glb)
+}
+
 const HALF: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 fn downwards() -> Value {
