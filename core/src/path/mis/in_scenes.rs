@@ -34,6 +34,7 @@ use crate::trace::moment::Moment;
 use crate::trace::ray::Ray;
 use core::f64::consts::PI;
 use glam::{DVec3, Vec2, Vec3};
+use libm::log;
 use world::{Kind, Numbers, scene, settings};
 
 const NOW: Moment = Moment::STILL;
@@ -155,9 +156,10 @@ struct Walked<'a> {
 }
 
 fn continuation(vertex: &Vertex<'_>, v: &Point<'_>, direction: Vec3, transport: Transport) -> Continuation {
-    let density = match v.specular {
-        true => Density::Delta,
-        false => Density::SolidAngle(vertex.evaluate(direction, transport).1),
+    let density = if v.specular {
+        Density::Delta
+    } else {
+        Density::SolidAngle(vertex.evaluate(direction, transport).1)
     };
     let weight = Weight::Smooth(Scattered::default());
     Continuation { direction, weight, density, eta: 1.0, crossing: vertex.crossing(direction) }
@@ -333,21 +335,21 @@ impl<'a> Path<'a> {
             Place::Surface(_) => f64::from(self.next_event_pdf()) * back / off,
             _ => place,
         };
-        let mut from_light = vec![place.ln(), (emitted * cosine(first.to[0], first.at.ng) / off).ln()];
-        let mut from_eye = vec![(self.pdf(0, 0, rules) * back / off).ln()];
+        let mut from_light = vec![log(place), log(emitted * cosine(first.to[0], first.at.ng) / off)];
+        let mut from_eye = vec![log(self.pdf(0, 0, rules) * back / off)];
         for i in 1..count {
             let [a, b] = [&self.vertices[i - 1], &self.vertices[i]];
             let off = squared(a.at.position, b.at.position);
-            from_light.push((self.pdf(i - 1, 1, rules) * cosine(b.to[0], b.at.ng) / off).ln());
-            from_eye.push((self.pdf(i, 0, rules) * cosine(a.to[1], a.at.ng) / off).ln());
+            from_light.push(log(self.pdf(i - 1, 1, rules) * cosine(b.to[0], b.at.ng) / off));
+            from_eye.push(log(self.pdf(i, 0, rules) * cosine(a.to[1], a.at.ng) / off));
         }
         let last = &self.vertices[count - 1];
         let cos = cosine(last.to[1], last.at.ng);
         from_eye.push(match self.seen.pdf {
-            Importance::SolidAngle(pdf) => (pdf * cos / squared(self.seen.end, last.at.position)).ln(),
-            Importance::Area(pdf) => (pdf * cos).ln(),
+            Importance::SolidAngle(pdf) => log(pdf * cos / squared(self.seen.end, last.at.position)),
+            Importance::Area(pdf) => log(pdf * cos),
         });
-        (from_light, picked.ln(), from_eye)
+        (from_light, log(picked), from_eye)
     }
 
     /// Logarithm of how often each technique makes the path, from s = 0 to all but the lens; minus infinity where it cannot.
@@ -361,7 +363,7 @@ impl<'a> Path<'a> {
                 return f64::NEG_INFINITY;
             }
             let light: f64 = if s == 1 { picked } else { from_light[..s].iter().sum() };
-            let splats = if s == count + 1 { rules.light_paths.ln() } else { 0.0 };
+            let splats = if s == count + 1 { log(rules.light_paths) } else { 0.0 };
             light + from_eye[s..].iter().sum::<f64>() + splats
         };
         (0..count + 2).map(of).collect()
@@ -394,7 +396,8 @@ fn check(kind: Kind, most: usize, seed: u32, tries: u32, found: &mut Found) {
             for s in (0..densities.len()).filter(able) {
                 let recursive = path.weight(s, &walked);
                 let all = (0..densities.len()).filter(able);
-                let written_out = 1.0 / all.map(|o| h.of((densities[o] - densities[s]).exp())).sum::<f64>();
+                let written_out =
+                    1.0 / all.map(|o| h.of(libm::exp(densities[o] - densities[s]))).sum::<f64>();
                 let off = (recursive - written_out).abs() / written_out.max(1e-200);
                 let what = || {
                     let (place, n) = (&path.origin.place, path.vertices.len());

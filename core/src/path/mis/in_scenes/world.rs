@@ -47,7 +47,7 @@ impl Document {
 
     fn body(&mut self, material: &Value, triangles: &[[Vec3; 3]]) {
         let bytes: Vec<u8> =
-            triangles.iter().flatten().flat_map(|p| p.to_array()).flat_map(f32::to_le_bytes).collect();
+            triangles.iter().flatten().flat_map(Vec3::to_array).flat_map(f32::to_le_bytes).collect();
         let data = base64::engine::general_purpose::STANDARD.encode(&bytes);
         let uri = format!("data:application/octet-stream;base64,{data}");
         let buffer = self.push("buffers", json!({"byteLength": bytes.len(), "uri": uri}));
