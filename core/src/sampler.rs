@@ -61,6 +61,47 @@ pub enum Use {
     Lens,
 }
 
+/// What nearly every scattering draws, in the order of their dimensions.
+const DRAWN_TOGETHER: [Use; 4] = [Use::Choice, Use::Direction, Use::Light, Use::LightPoint];
+
+/// The pairs of one scattering that are drawn together, first and second numbers.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ScatteringNumbers {
+    first: [f32; 4],
+    second: [f32; 4],
+}
+
+impl ScatteringNumbers {
+    /// Choice of lobe, and roulette.
+    #[inline]
+    pub fn choice(&self) -> Vec2 {
+        self.pair(0)
+    }
+
+    /// Direction.
+    #[inline]
+    pub fn direction(&self) -> Vec2 {
+        self.pair(1)
+    }
+
+    /// Choice of light.
+    #[inline]
+    pub fn light(&self) -> f32 {
+        self.first[2]
+    }
+
+    /// Place on the light.
+    #[inline]
+    pub fn light_point(&self) -> Vec2 {
+        self.pair(3)
+    }
+
+    #[inline]
+    fn pair(&self, place: usize) -> Vec2 {
+        Vec2::new(self.first[place], self.second[place])
+    }
+}
+
 /// Keeps light subpaths apart from the pixel's own numbers.
 const LIGHT: u64 = 0x6c69_6768_7473;
 /// Dimensions before the first scattering.
@@ -97,12 +138,36 @@ impl Sampler {
     /// Two numbers in [0, 1), well spread over the indices of a pixel.
     #[inline]
     pub fn pair(&self, dimension: Dimension) -> Vec2 {
-        let key = mix(self.key ^ u64::from(dimension.number()));
-        let index = shuffle(self.index, key as u32);
-        let scrambles = mix(key);
-        let x = scramble(index, scrambles as u32).reverse_bits();
-        let y = scramble(pascal(index), (scrambles >> 32) as u32).reverse_bits();
-        Vec2::new(unit(x), unit(y))
+        let ([first], [second]) = self.pairs([dimension.number()]);
+        Vec2::new(first, second)
+    }
+
+    /// The pairs of a scattering, each as [`Self::pair`] gives it; `at` makes its dimensions. All four are computed in the lanes
+    /// of one register, for little more than what one costs.
+    #[inline]
+    pub fn scattering(&self, at: impl Fn(Use) -> Dimension) -> ScatteringNumbers {
+        self.four(DRAWN_TOGETHER.map(|what| at(what).number()))
+    }
+
+    /// Not inlined: what is not written to memory is not put into lanes.
+    #[inline(never)]
+    fn four(&self, dimensions: [u32; 4]) -> ScatteringNumbers {
+        let (first, second) = self.pairs(dimensions);
+        ScatteringNumbers { first, second }
+    }
+
+    #[inline(always)]
+    fn pairs<const N: usize>(&self, dimensions: [u32; N]) -> ([f32; N], [f32; N]) {
+        let keys = dimensions.map(|dimension| mix(self.key ^ u64::from(dimension)));
+        let scrambles = keys.map(mix);
+        let reversed = self.index.reverse_bits();
+        let (mut first, mut second) = ([0.0; N], [0.0; N]);
+        for i in 0..N {
+            let index = scramble(reversed, keys[i] as u32).reverse_bits();
+            first[i] = unit(scramble(index, scrambles[i] as u32).reverse_bits());
+            second[i] = unit(scramble(pascal(index), (scrambles[i] >> 32) as u32).reverse_bits());
+        }
+        (first, second)
     }
 
     /// A key for decisions that are independent of one another and of every other number:
@@ -136,7 +201,8 @@ fn mix(z: u64) -> u64 {
 }
 
 /// Flips each bit by a hash of the bits below it (Laine and Karras 2011, with the constants of
-/// Vegdahl 2021): on bit-reversed fractions this is nested uniform scrambling.
+/// Vegdahl 2021): on bit-reversed fractions this is nested uniform scrambling, and so it is on bit-reversed indices: aligned
+/// dyadic ranges go to aligned dyadic ranges.
 #[inline]
 fn scramble(x: u32, seed: u32) -> u32 {
     let x = x ^ x.wrapping_mul(0x3d20_adea);
@@ -144,12 +210,6 @@ fn scramble(x: u32, seed: u32) -> u32 {
     let x = x.wrapping_mul((seed >> 16) | 1);
     let x = x ^ x.wrapping_mul(0x0552_6c56);
     x ^ x.wrapping_mul(0x53a2_2864)
-}
-
-/// Nested uniform scrambling of an index: aligned dyadic ranges go to aligned dyadic ranges.
-#[inline]
-fn shuffle(index: u32, seed: u32) -> u32 {
-    scramble(index.reverse_bits(), seed).reverse_bits()
 }
 
 /// The second Sobol' dimension before bit reversal: multiplication with Pascal's triangle modulo
@@ -201,6 +261,20 @@ mod tests {
                     }
                     assert!(cells.iter().all(|n| *n == 1), "{dimension:?} {start} {columns}x{rows}");
                 }
+            }
+        }
+    }
+
+    #[test]
+    fn numbers_drawn_together_are_those_drawn_alone() {
+        for (n, index) in [(0, 0), (3, 77), (2047, u32::MAX)] {
+            let sampler = Sampler::new(5, 1, [3, 4], index);
+            for at in [Dimension::Eye, Dimension::Light] {
+                let alone = |what| sampler.pair(at(n, what));
+                let together = sampler.scattering(|what| at(n, what));
+                let [choice, direction, light, light_point] = DRAWN_TOGETHER.map(alone);
+                assert_eq!((together.choice(), together.direction()), (choice, direction));
+                assert_eq!((together.light(), together.light_point()), (light.x, light_point));
             }
         }
     }

@@ -96,6 +96,15 @@ pub struct JobRequest {
     /// Higher goes first.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub priority: Option<i32>,
+    /// Its share of batches among jobs of its priority, in proportion: 1 where it is not said.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub weight: Option<u32>,
+    /// Only workers that offer all of these get its batches.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub tags: Vec<String>,
+    /// So many workers hold its batches at a time, at most.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_workers: Option<u32>,
 }
 
 /// A method by name.
@@ -140,4 +149,16 @@ pub struct JobPatch {
     /// `paused` or `running`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub state: Option<crate::status::JobState>,
+    /// Samples a pixel at most: more than before. A job that is done goes on.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub samples: Option<u32>,
+    /// Stop when the relative error is certified at or under this. A job that is done goes on.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error: Option<f64>,
+    /// Its share of batches among jobs of its priority.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub weight: Option<u32>,
+    /// So many workers hold its batches at a time, at most.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_workers: Option<u32>,
 }

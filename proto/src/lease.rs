@@ -81,6 +81,10 @@ pub struct Lease {
     pub batch: Batch,
     /// Seconds until it ends unless it is renewed.
     pub seconds: f64,
+    /// Where its sum may be put directly (HTTP PUT, without a token) before the farm is told so; `None`
+    /// where it is brought to the farm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub upload: Option<String>,
 }
 
 /// What became of an uploaded sum.

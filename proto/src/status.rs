@@ -109,6 +109,9 @@ pub struct JobStatus {
     pub method_reason: String,
     /// The path expression.
     pub paths: String,
+    /// The class of processors whose bits its sums have, once its first batch was handed out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub class: Option<String>,
     /// Paths that are asked for and that no technique of the method makes.
     #[serde(default)]
     pub unreachable: Vec<Unreachable>,
@@ -172,6 +175,9 @@ pub struct WorkerStatus {
     pub failures: u64,
     /// Rays a second, over its last batch.
     pub rays_per_second: f64,
+    /// Why it was put aside.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
 }
 
 /// How a worker stands.
@@ -186,6 +192,8 @@ pub enum WorkerState {
     Lost,
     /// Took its leave.
     Gone,
+    /// Gets no batches: it failed at several jobs, or its sums were wrong.
+    Aside,
 }
 
 /// One page of a list.

@@ -6,3 +6,4 @@ pub mod farm;
 pub mod inspect;
 pub mod serve;
 pub mod store;
+pub mod tls;

@@ -4,6 +4,7 @@ mod command;
 
 use clap::Parser as _;
 use command::{exit::Exit, line::Line, terminal};
+use ovtigre_worker::flags::usage;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
@@ -11,5 +12,12 @@ fn main() -> ExitCode {
         terminal::error(&lack);
         return Exit::Wrong.into();
     }
-    Line::parse().run()
+    match Line::try_parse() {
+        Ok(line) => line.run(),
+        Err(error) if error.use_stderr() && !usage(&error).is_empty() => {
+            terminal::error(&usage(&error));
+            Exit::Wrong.into()
+        }
+        Err(help) => help.exit(),
+    }
 }

@@ -1,17 +1,19 @@
 //! A farm that listens: store, blobs, rules and doors put together.
 
 use crate::{
-    api::router,
+    api::{guard::Guarding, router},
     blobs::{BlobError, Blobs},
     farm::{Farm, error::FarmError, rules::Rules},
     inspect::inspect,
-    store::{error::StoreError, sqlite::Sqlite},
+    store::{Store, error::StoreError, sql::Sql},
+    tls::{TlsListener, acceptor},
 };
+use axum::{Router, serve::Listener};
 use ovtigre_core::gltf::limits::Limits;
 use std::{
     fs::{File, TryLockError},
     io,
-    net::SocketAddr,
+    net::{Ipv4Addr, SocketAddr},
     path::{Path, PathBuf},
     sync::Arc,
     time::Duration,
@@ -27,8 +29,46 @@ const LAST_REQUESTS: Duration = Duration::from_secs(5);
 pub struct ServeConfig {
     /// Address to listen on; port 0 takes a free one.
     pub listen: SocketAddr,
-    /// Folder of database and blobs; made where it is not there.
+    /// Folder of database and blobs, where they are not elsewhere; made where it is not there.
     pub data: PathBuf,
+    /// A PostgreSQL server, `postgres://…`, instead of a database in the folder.
+    pub database: Option<String>,
+    /// A bucket, `s3://bucket/prefix`, instead of files in the folder.
+    pub blobs: Option<String>,
+    /// How long, how many, how much.
+    pub rules: Rules,
+    /// Who is let in.
+    pub guarding: Guarding,
+    /// Files of a certificate chain and its key: callers encrypt.
+    pub tls: Option<(PathBuf, PathBuf)>,
+    /// Whether it listens on a port of this machine, too, for workers of its own: without encryption.
+    pub own_port: OwnPort,
+}
+
+/// Whether a farm listens on a free port of this machine, too.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum OwnPort {
+    /// It does.
+    Yes,
+    /// It does not.
+    #[default]
+    No,
+}
+
+impl ServeConfig {
+    /// All in a folder, for callers of this machine.
+    pub fn new(listen: SocketAddr, data: PathBuf) -> Self {
+        Self {
+            listen,
+            data,
+            database: None,
+            blobs: None,
+            rules: Rules::default(),
+            guarding: Guarding::default(),
+            tls: None,
+            own_port: OwnPort::No,
+        }
+    }
 }
 
 /// Why a farm does not listen.
@@ -53,6 +93,9 @@ pub enum ServeError {
         /// Why.
         error: io::Error,
     },
+    /// The certificate or its key cannot be used.
+    #[error("cannot encrypt: {0}")]
+    Tls(String),
     /// The database cannot be used.
     #[error(transparent)]
     Store(#[from] StoreError),
@@ -69,28 +112,64 @@ pub enum ServeError {
 pub struct Serving {
     /// Where it listens.
     pub address: SocketAddr,
+    /// Where it listens for workers of its own, if elsewhere.
+    pub own: Option<SocketAddr>,
     farm: Arc<Farm>,
     closing: CancellationToken,
     server: JoinHandle<io::Result<()>>,
-    /// Held until the end: keeps others from the data folder.
-    _lock: File,
+    own_server: Option<JoinHandle<io::Result<()>>>,
+    /// Held until the end: keeps others from the database in the data folder.
+    _lock: Option<File>,
 }
 
-/// Opens the data folder, takes up what was under way, and listens.
+/// Opens database and blobs, takes up what was under way, and listens.
 pub async fn start(config: ServeConfig) -> Result<Serving, ServeError> {
-    let lock = lock(&config.data)?;
+    let acceptor = match &config.tls {
+        Some((chain, key)) => Some(acceptor(chain, key).map_err(ServeError::Tls)?),
+        None => None,
+    };
+    let lock = if config.database.is_none() { Some(lock(&config.data)?) } else { None };
     let listening = |error| ServeError::Listen { address: config.listen, error };
     let listener = TcpListener::bind(config.listen).await.map_err(listening)?;
     let address = listener.local_addr().map_err(listening)?;
-    let store = Arc::new(Sqlite::open(&config.data.join("farm.sqlite")).await?);
-    let blobs = Blobs::folder(&config.data.join("blobs"))?;
-    let farm = Farm::open(store, blobs, inspect(Limits::default()), Rules::default()).await?;
+    let store: Arc<dyn Store> = match &config.database {
+        Some(url) => Arc::new(Sql::server(url).await?),
+        None => Arc::new(Sql::file(&config.data.join("farm.sqlite")).await?),
+    };
+    let blobs = match &config.blobs {
+        Some(url) => Blobs::bucket(url)?,
+        None => Blobs::folder(&config.data.join("blobs"))?,
+    };
+    blobs.ping().await?;
+    let farm = Farm::open(store, blobs, inspect(Limits::default()), config.rules).await?;
     let closing = CancellationToken::new();
-    let closed = closing.clone().cancelled_owned();
-    let server = axum::serve(listener, router(Arc::clone(&farm))).with_graceful_shutdown(closed);
-    let server = tokio::spawn(server.into_future());
+    let doors = router(Arc::clone(&farm), config.guarding);
+    let (mut own, mut own_server) = (None, None);
+    if config.own_port == OwnPort::Yes {
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).await.map_err(listening)?;
+        own = Some(listener.local_addr().map_err(listening)?);
+        own_server = Some(serve(listener, doors.clone(), &closing));
+    }
+    let server = match acceptor {
+        Some(acceptor) => serve(TlsListener::new(listener, acceptor).map_err(listening)?, doors, &closing),
+        None => serve(listener, doors, &closing),
+    };
     tracing::info!(%address, data = %config.data.display(), "farm listens");
-    Ok(Serving { address, farm, closing, server, _lock: lock })
+    Ok(Serving { address, own, farm, closing, server, own_server, _lock: lock })
+}
+
+fn serve<L>(listener: L, doors: Router, closing: &CancellationToken) -> JoinHandle<io::Result<()>>
+where
+    L: Listener<Addr = SocketAddr>,
+{
+    let closed = closing.clone().cancelled_owned();
+    tokio::spawn(axum::serve(listener, doors).with_graceful_shutdown(closed).into_future())
+}
+
+/// Bytes that are free on the disk of a folder.
+pub fn free_bytes(folder: &Path) -> Option<u64> {
+    let about = rustix::fs::statvfs(folder).ok()?;
+    Some(about.f_bavail.saturating_mul(about.f_frsize))
 }
 
 fn lock(folder: &Path) -> Result<File, ServeError> {
@@ -112,6 +191,9 @@ impl Serving {
         self.closing.cancel();
         // Ends event streams and waits for pictures.
         self.farm.stopping.cancel();
+        if let Some(own) = self.own_server {
+            own.abort();
+        }
         let abort = self.server.abort_handle();
         match tokio::time::timeout(LAST_REQUESTS, self.server).await {
             Ok(Ok(Ok(()))) => {}
@@ -136,7 +218,7 @@ mod tests {
     };
 
     fn config(data: &Path) -> ServeConfig {
-        ServeConfig { listen: ([127, 0, 0, 1], 0).into(), data: data.to_owned() }
+        ServeConfig::new(([127, 0, 0, 1], 0).into(), data.to_owned())
     }
 
     /// What comes until `end` is in it, or the connection ends.
@@ -157,7 +239,7 @@ mod tests {
     fn post(path: &str, kind: &str, body: &str) -> String {
         let length = body.len();
         format!(
-            "POST {path} HTTP/1.1\r\nhost: x\r\ncontent-type: {kind}\r\ncontent-length: {length}\r\n\r\n{body}"
+            "POST {path} HTTP/1.1\r\nhost: localhost\r\ncontent-type: {kind}\r\ncontent-length: {length}\r\n\r\n{body}"
         )
     }
 
@@ -178,7 +260,7 @@ mod tests {
         let (_, answer) = ask(farm.address, post("/v1/jobs", "application/json", &job), "\"warnings\"").await;
         assert!(answer.starts_with("HTTP/1.1 202"), "{answer}");
         let location = answer.lines().find_map(|line| line.strip_prefix("location: ")).unwrap().to_owned();
-        let listen = format!("GET {location}/events HTTP/1.1\r\nhost: x\r\n\r\n");
+        let listen = format!("GET {location}/events HTTP/1.1\r\nhost: localhost\r\n\r\n");
         let (mut stream, answer) = ask(farm.address, listen, "\"event\":\"status\"").await;
         assert!(answer.contains("text/event-stream"), "{answer}");
 
@@ -188,7 +270,7 @@ mod tests {
         read_until(&mut stream, "never").await;
 
         let farm = start(config(folder.path())).await.unwrap();
-        let get = format!("GET {location} HTTP/1.1\r\nhost: x\r\nconnection: close\r\n\r\n");
+        let get = format!("GET {location} HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\n\r\n");
         let (_, answer) = ask(farm.address, get, "never").await;
         assert!(answer.contains("\"queued\""), "{answer}");
         farm.stop().await;

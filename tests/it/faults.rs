@@ -9,6 +9,7 @@ use ovtigre_tests::{
     program::Farm,
     room::room,
     scenes::furnace,
+    services::Shared,
 };
 use std::{fs, path::Path};
 
@@ -153,4 +154,38 @@ fn a_killed_farm_goes_on_where_it_was() {
         picture.channels == undisturbed(&room(), &plain(), SAMPLES).channels,
         "the picture differs from that of core alone"
     );
+}
+
+/// Two farms over one database and one bucket: workers and one of the farms are killed, another comes, and the picture is
+/// that of core alone. `dies` is the number of the farm that is killed.
+fn assert_a_server_may_die(name: &str, dies: usize) {
+    let Some(shared) = Shared::place(name) else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let server = |n: usize| Farm::start_with(&folder.path().join(format!("farm-{n}")), &shared.flags());
+    let mut farms = vec![server(0), server(1)];
+    let job = submit(&farms[0], folder.path(), &room(), &plain(), SAMPLES, &[]);
+    let (first, _second) = (farms[0].worker(), farms[1].worker());
+    let then = farms[1].wait(&job, |j| batches(j) > 0);
+    first.kill();
+    assert_eq!(then["state"], "running", "the job was over before anything could go wrong: {then}");
+    farms.remove(dies).kill();
+    farms.push(server(2));
+    let (_third, _fourth) = (farms[0].worker(), farms[1].worker());
+    let expected = undisturbed(&room(), &plain(), SAMPLES).channels;
+    for farm in &farms {
+        let done = farm.wait(&job, |j| j["state"] == "done");
+        assert_eq!((&done["invalid_samples"], &done["batches_done"]), (&0.into(), &done["batches_asked"]));
+        let picture = fetch(farm, &job, folder.path());
+        assert!(picture.channels == expected, "the picture differs from that of core alone");
+    }
+}
+
+#[test]
+fn a_killed_server_that_took_the_job_changes_no_byte() {
+    assert_a_server_may_die("took", 0);
+}
+
+#[test]
+fn a_killed_server_that_others_worked_for_changes_no_byte() {
+    assert_a_server_may_die("other", 1);
 }

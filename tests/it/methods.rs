@@ -48,7 +48,7 @@ fn smooth_glass() {
 
 #[test]
 fn coats_cloth_and_leaves() {
-    agree(&matrix::layers(), Samples { path: 4, both: 2, light: 8 });
+    agree(&matrix::coats_cloth_and_leaves(), Samples { path: 6, both: 2, light: 8 });
 }
 
 #[test]

@@ -66,7 +66,7 @@ fn on_coated_plastic_and_mixtures() {
 
 #[test]
 fn on_coats_sheen_and_leaves() {
-    agree(&matrix::layers(), 2, 2);
+    agree(&matrix::coats_cloth_and_leaves(), 2, 2);
 }
 
 #[test]

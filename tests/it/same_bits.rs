@@ -20,16 +20,24 @@ use ovtigre_tests::{
     glb::Glb,
     picture::{in_environment, rendered, scene, settings},
     scenes::{cuboid, floor, glass, lambert, sphere},
+    textures::png,
 };
-use serde_json::json;
+use serde_json::{Value, json};
 use std::sync::Arc;
 
 /// A small scene with a bit of everything, all lengths times `scale`, then moved by `offset` along each axis.
 fn everything(scale: f64, offset: f64) -> Vec<u8> {
+    everything_of(scale, offset, |_, material| material)
+}
+
+/// The same with its materials changed.
+fn everything_of(scale: f64, offset: f64, change: impl Fn(&mut Glb, Value) -> Value) -> Vec<u8> {
     let mut glb = Glb::new();
-    let mut add = |material: serde_json::Value, (positions, triangles): (Vec<Vec3>, Vec<[u32; 3]>)| {
+    let mut add = |material: Value, (positions, triangles): (Vec<Vec3>, Vec<[u32; 3]>)| {
+        let material = change(&mut glb, material);
         let material = glb.material(material);
-        let mesh = glb.mesh(&positions, &triangles, material);
+        let uvs = vec![0.5; 2 * positions.len()];
+        let mesh = glb.mesh_with(&positions, &triangles, material, &[("TEXCOORD_0", &uvs, 2)]);
         glb.place(mesh);
     };
     add(lambert(0.6, 0.0), floor(-1.0, 10.0, 0.0, 0.0));
@@ -98,6 +106,26 @@ fn methods() -> Vec<(String, Settings)> {
     let mut radiosity = in_environment(settings(24, 20, 2), 0.2);
     (radiosity.method, radiosity.paths) = (Method::Radiosity, "LD*E".to_owned());
     both.chain([("Radiosity".to_owned(), radiosity)]).collect()
+}
+
+/// What is alike all over a surface is found once for all of its points, and what lights have in common once for all next
+/// events. A white texture is no reason for other bits.
+#[test]
+fn white_textures_change_no_bit() {
+    let white = |glb: &mut Glb, mut material: Value| {
+        let texture = json!({"index": glb.texture(&png(1, &[[255; 4]]), json!({}))});
+        for name in ["baseColorTexture", "metallicRoughnessTexture"] {
+            material["pbrMetallicRoughness"][name] = texture.clone();
+        }
+        material["emissiveTexture"] = texture;
+        material
+    };
+    let (plain, textured) = (everything(1.0, 0.0), everything_of(1.0, 0.0, white));
+    for (name, settings) in methods() {
+        let block = Block { index: 0, start: 0, count: 4 };
+        let batch = Batch { region: settings.size.frame(), replicate: 0, block };
+        assert!(sum(&plain, &settings, batch, 1) == sum(&textured, &settings, batch, 1), "{name}");
+    }
 }
 
 #[test]

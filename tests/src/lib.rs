@@ -7,6 +7,7 @@ pub mod picture;
 pub mod program;
 pub mod room;
 pub mod scenes;
+pub mod services;
 pub mod showcase;
 pub mod stage;
 pub mod textures;

@@ -69,8 +69,8 @@ pub fn coated() -> Case {
     case("coated", glb)
 }
 
-/// A clear coat over metal, sheen over plastic, and a leaf that light goes through.
-pub fn layers() -> Case {
+/// A metal under a coat, cloth, and a leaf that light shines through.
+pub fn coats_cloth_and_leaves() -> Case {
     let glb = room(10.0, |glb| {
         let mut coated = metal(0.5);
         coated["extensions"] = json!({"KHR_materials_clearcoat":

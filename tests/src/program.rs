@@ -1,5 +1,6 @@
 //! The program `ovtigre` as processes: a farm, workers, commands.
 
+use ovtigre_proto::client::farm::Client;
 use std::{
     ffi::OsStr,
     io::{BufRead as _, BufReader},
@@ -58,9 +59,15 @@ pub struct Farm {
 impl Farm {
     /// Starts a farm over a folder.
     pub fn start(data: &Path) -> Self {
+        Self::start_with(data, &[])
+    }
+
+    /// Starts a farm over a folder, with further flags.
+    pub fn start_with(data: &Path, further: &[&str]) -> Self {
         let mut child = Command::new(program())
             .args(["serve", "--listen", "127.0.0.1:0", "--data"])
             .arg(data)
+            .args(further)
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
@@ -99,7 +106,10 @@ impl Farm {
 
     /// The job as JSON.
     pub fn job(&self, id: &str) -> serde_json::Value {
-        serde_json::from_str(&self.client(&["status", id, "--json"])).expect("JSON")
+        let id = id.parse().expect("a job's name");
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a thread");
+        let job = runtime.block_on(async { Client::new(&self.url, 0)?.job(&id).await });
+        serde_json::to_value(job.expect("the farm answers")).expect("plain data")
     }
 
     /// Waits until `reached` says so of the job, at most two minutes.

@@ -10,9 +10,9 @@ use ovtigre_core::film::{
 use ovtigre_proto::{
     client::farm::Client,
     id::LeaseId,
-    lease::{FailureKind, LeaseFailure},
+    lease::{Committed, FailureKind, LeaseFailure},
 };
-use std::sync::Arc;
+use std::{sync::Arc, time::Duration};
 
 /// A rendered batch.
 #[derive(Clone, Debug)]
@@ -27,12 +27,27 @@ pub struct Rendered {
     pub attributes: PartialAttributes,
     /// Time spent on it in seconds.
     pub seconds: f64,
+    /// Where it may be put directly.
+    pub upload: Option<String>,
+}
+
+/// Slowest line that is waited for, in bytes a second.
+const SLOWEST: f64 = 50_000.0;
+
+/// Puts a sum where its lease said, and tells the farm; `None` where that does not work.
+async fn hand(client: &Client, lease: &LeaseId, url: &str, sum: &Bytes, seconds: f64) -> Option<Committed> {
+    let patience = Duration::from_secs_f64(10.0 + sum.len() as f64 / SLOWEST);
+    if let Err(error) = client.put_elsewhere(url, sum.clone(), patience).await {
+        tracing::debug!(%lease, %error, "a sum could not be put directly");
+        return None;
+    }
+    client.handed(lease, seconds).await.ok()
 }
 
 /// Brings a sum until the farm has taken or refused it; takes its lease off the desk. Its file is written here,
 /// while the pool renders the next batch.
 pub async fn bring(client: Client, desk: Arc<Desk>, rendered: Rendered) {
-    let Rendered { lease, sum, size, attributes, seconds } = rendered;
+    let Rendered { lease, sum, size, attributes, seconds, upload } = rendered;
     let partial = tokio::task::spawn_blocking(move || Bytes::from(write_partial(&sum, size, &attributes)));
     let sum = match partial.await {
         Ok(sum) => sum,
@@ -42,6 +57,13 @@ pub async fn bring(client: Client, desk: Arc<Desk>, rendered: Rendered) {
                 .await;
         }
     };
+    if let Some(url) = upload
+        && let Some(committed) = hand(&client, &lease, &url, &sum, seconds).await
+    {
+        tracing::debug!(%lease, commit = ?committed.commit, "put directly");
+        desk.remove(&lease);
+        return;
+    }
     let mut backoff = client.backoff();
     loop {
         match client.bring(&lease, sum.clone(), seconds).await {

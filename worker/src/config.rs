@@ -7,6 +7,8 @@ use std::path::PathBuf;
 pub struct Config {
     /// The farm's address.
     pub server: String,
+    /// What lets it in, where that is needed.
+    pub token: Option<String>,
     /// A name for people.
     pub name: String,
     /// Threads to render with, at least 1.

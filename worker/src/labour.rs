@@ -153,7 +153,8 @@ impl<R: Renderer> Labour<R> {
             solution: self.renderer.solution(&scene),
         };
         let seconds = start.elapsed().as_secs_f64();
-        Ok(Some(Rendered { lease: id.clone(), sum, size: settings.size, attributes, seconds }))
+        let (lease, size, upload) = (id.clone(), settings.size, work.lease.upload.clone());
+        Ok(Some(Rendered { lease, sum, size, attributes, seconds, upload }))
     }
 
     fn scene(&self, lease: &Lease, files: Option<Files>) -> Result<Arc<R::Scene>, Failed> {

@@ -46,12 +46,12 @@ impl Bell {
         receiver.wait_for(|now| *now >= leave).await.expect("this bell holds the sender");
     }
 
-    /// The first SIGINT or SIGTERM of the process rings for [`Leave::AfterBatch`], the second for
+    /// The first SIGINT, SIGTERM or SIGHUP of the process rings for `first`, the second for
     /// [`Leave::Now`].
-    pub async fn ring_on_signals(self) {
+    pub async fn ring_on_signals(self, first: Leave) {
         loop {
             signal().await;
-            let urgency = if self.heard() == Leave::Stay { Leave::AfterBatch } else { Leave::Now };
+            let urgency = if self.heard() == Leave::Stay { first } else { Leave::Now };
             tracing::info!(?urgency, "told to leave");
             self.ring(urgency);
         }
@@ -66,18 +66,19 @@ impl Bell {
     }
 }
 
-/// Returns at the next SIGINT or SIGTERM.
+/// Returns at the next SIGINT, SIGTERM or SIGHUP: a terminal that is closed asks like Ctrl-C in it.
 #[cfg(unix)]
 async fn signal() {
     use tokio::signal::unix::{SignalKind, signal};
-    let (Ok(mut interrupt), Ok(mut terminate)) =
-        (signal(SignalKind::interrupt()), signal(SignalKind::terminate()))
+    let (Ok(mut interrupt), Ok(mut terminate), Ok(mut hangup)) =
+        (signal(SignalKind::interrupt()), signal(SignalKind::terminate()), signal(SignalKind::hangup()))
     else {
         return std::future::pending().await;
     };
     tokio::select! {
         _ = interrupt.recv() => {}
         _ = terminate.recv() => {}
+        _ = hangup.recv() => {}
     }
 }
 

@@ -1,7 +1,12 @@
 //! The program `ovtigre-worker`.
 
 use clap::Parser;
-use ovtigre_worker::{flags::WorkFlags, leave::Bell, processor, run::run};
+use ovtigre_worker::{
+    flags::{WorkFlags, usage},
+    leave::Bell,
+    processor,
+    run::run,
+};
 use std::{
     io::{Write as _, stderr},
     process::{ExitCode, id},
@@ -19,7 +24,15 @@ struct Line {
 }
 
 fn main() -> ExitCode {
-    match processor::check().map_err(anyhow::Error::msg).and_then(|()| work(&Line::parse())) {
+    let line = match Line::try_parse() {
+        Ok(line) => line,
+        Err(error) if error.use_stderr() => {
+            writeln!(stderr(), "error: {}", usage(&error)).ok();
+            return ExitCode::from(2);
+        }
+        Err(help) => help.exit(),
+    };
+    match processor::check().map_err(anyhow::Error::msg).and_then(|()| work(&line)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             writeln!(stderr(), "error: {error:#}").ok();
@@ -33,7 +46,7 @@ fn work(line: &Line) -> anyhow::Result<()> {
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?;
     let result = runtime.block_on(async {
         let bell = Bell::default();
-        tokio::spawn(bell.clone().ring_on_signals());
+        tokio::spawn(bell.clone().ring_on_signals(line.work.first_signal()));
         if line.work.until_stdin_closes {
             tokio::spawn(bell.clone().ring_when_stdin_closes());
         }

@@ -68,6 +68,7 @@ pub(crate) fn lease(n: u32, seconds: f64) -> Lease {
             block: Block { index: n, start: n, count: 1 },
         },
         seconds,
+        upload: None,
     }
 }
 
@@ -176,6 +177,7 @@ impl MockFarm {
     pub(crate) fn config(&self, cache: PathBuf) -> Config {
         Config {
             server: self.address.to_string(),
+            token: None,
             name: "test".to_owned(),
             threads: 2,
             tags: Vec::new(),

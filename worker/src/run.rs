@@ -50,6 +50,8 @@ pub async fn run(config: Config, bell: Bell) -> Result<(), WorkerError> {
 /// Works with another renderer.
 pub async fn run_with<R: Renderer>(config: Config, renderer: R, bell: Bell) -> Result<(), WorkerError> {
     let client = Client::new(&config.server, config.seed).map_err(WorkerError::Refused)?;
+    let client = client.with_token(config.token.as_deref());
+    client.resolve().await.map_err(WorkerError::Refused)?;
     let join = WorkerJoin {
         name: config.name,
         threads: config.threads as u32,

@@ -6,6 +6,7 @@
 
 pub mod albedo;
 pub mod conductor;
+pub mod dispersed;
 pub mod event;
 pub mod fresnel;
 pub mod ggx;
@@ -28,6 +29,7 @@ pub mod surface;
 mod tests;
 
 use crate::bsdf::conductor::Conductor;
+use crate::bsdf::dispersed::{Dispersed, indices};
 use crate::bsdf::event::{BsdfSample, Letter, Letters, SampleKind, Scattered, Transport};
 use crate::bsdf::fresnel::{Schlick, dielectric_at_normal};
 use crate::bsdf::glass::Glass;
@@ -62,6 +64,8 @@ pub enum Bsdf {
     Kept(Kept),
     /// Any of them under a coat or cloth.
     Layered(Box<Layered>),
+    /// Any of them with an index for each colour.
+    Dispersed(Box<Dispersed>),
 }
 
 impl Bsdf {
@@ -80,6 +84,10 @@ impl Bsdf {
             return Self::layered(given, letters);
         }
         let s = clamped(given);
+        // Written where it is returned to: a copy of the whole costs as much as making it.
+        if letters.contains(Letters::NATURAL) && !letters.has(Letter::Mirrored) {
+            return Self::whole(&s);
+        }
         let whole = Self::whole(&s);
         let own = whole.letters();
         let twins = letters.has(Letter::Mirrored) && own.has(Letter::Glossy);
@@ -96,6 +104,11 @@ impl Bsdf {
         let s = clamped(given);
         let mut below = mixture(&s);
         let Some(layers) = &s.layers else { return Self::Kept(Kept::new(&below, letters)) };
+        if layers.dispersion > 0.0 && s.walls == Walls::Solid && below.glass.is_some() {
+            let rest = Some(Layers { dispersion: 0.0, ..*layers }).filter(|rest| !rest.is_empty());
+            let band = |ior| Self::keeping(&SurfaceParameters { ior, layers: rest, ..s }, letters);
+            return Self::Dispersed(Box::new(Dispersed::new(indices(s.ior, layers.dispersion).map(band))));
+        }
         let mut through = None;
         if layers.through > 0.0
             && s.walls == Walls::Thin
@@ -134,6 +147,7 @@ impl Bsdf {
             Self::Mixture(part) => part.letters(),
             Self::Kept(part) => part.letters(),
             Self::Layered(part) => part.letters(),
+            Self::Dispersed(part) => part.letters(),
         }
     }
 
@@ -168,15 +182,7 @@ impl Bsdf {
         if wo.z.abs() < HORIZON {
             return None;
         }
-        let Drawn { wi, eta, delta } = match self {
-            Self::Lambert(_) => Lambert::draw(wo, u),
-            Self::Conductor(part) => part.draw(wo, u_lobe, u)?,
-            Self::Plastic(part) => part.draw(wo, u_lobe, u)?,
-            Self::Glass(part) => part.draw(wo, u_lobe, u, transport)?,
-            Self::Mixture(part) => part.draw(wo, u_lobe, u, transport)?,
-            Self::Kept(part) => part.draw(wo, u_lobe, u, transport)?,
-            Self::Layered(part) => part.draw(wo, u_lobe, u, transport)?,
-        };
+        let Drawn { wi, eta, delta } = self.draw(wo, u_lobe, u, transport)?;
         let kind = if let Some(delta) = delta {
             let Delta { value, probability, letter } = delta;
             SampleKind::Specular { letter, weight: value / probability, probability }
@@ -188,6 +194,20 @@ impl Bsdf {
             SampleKind::Smooth { value, pdf }
         };
         Some(BsdfSample { wi, kind, eta })
+    }
+
+    #[inline]
+    fn draw(&self, wo: Vec3, u_lobe: f32, u: Vec2, transport: Transport) -> Option<Drawn> {
+        match self {
+            Self::Lambert(_) => Some(Lambert::draw(wo, u)),
+            Self::Conductor(part) => part.draw(wo, u_lobe, u),
+            Self::Plastic(part) => part.draw(wo, u_lobe, u),
+            Self::Glass(part) => part.draw(wo, u_lobe, u, transport),
+            Self::Mixture(part) => part.draw(wo, u_lobe, u, transport),
+            Self::Kept(part) => part.draw(wo, u_lobe, u, transport),
+            Self::Layered(part) => part.draw(wo, u_lobe, u, transport),
+            Self::Dispersed(part) => part.draw(wo, u_lobe, u, transport),
+        }
     }
 
     #[inline]
@@ -203,6 +223,7 @@ impl Bsdf {
             Self::Mixture(part) => part.evaluate(wo, wi, transport),
             Self::Kept(part) => part.evaluate(wo, wi, transport),
             Self::Layered(part) => part.evaluate(wo, wi, transport),
+            Self::Dispersed(part) => part.evaluate(wo, wi, transport),
         }
     }
 }
@@ -254,6 +275,7 @@ fn clamped(s: &SurfaceParameters) -> SurfaceParameters {
             coat_normal: layers.coat_normal,
             sheen: Rgb::from_array(layers.sheen.to_array().map(unit)),
             sheen_roughness: unit(layers.sheen_roughness),
+            dispersion: layers.dispersion.max(0.0).min(f32::MAX),
             through: unit(layers.through),
             through_color: Rgb::from_array(layers.through_color.to_array().map(unit)),
         }),

@@ -12,7 +12,7 @@ pub enum Walls {
     Solid,
 }
 
-/// What lies on a surface, textures applied.
+/// What lies on a surface, and other things that few surfaces have; textures applied.
 #[derive(Clone, Copy, Debug)]
 pub struct Layers {
     /// `clearcoatFactor`, in 0..=1.
@@ -29,6 +29,15 @@ pub struct Layers {
     pub through: f32,
     /// `diffuseTransmissionColorFactor`, in 0..=1.
     pub through_color: Rgb,
+    /// 20 over the Abbe number of a solid's glass, not negative; 0 for one index of all colours.
+    pub dispersion: f32,
+}
+
+impl Layers {
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.coat <= 0.0 && self.sheen == Rgb::ZERO && self.through <= 0.0 && self.dispersion <= 0.0
+    }
 }
 
 /// A glTF metallic-roughness surface with `KHR_materials_specular`, `_ior`, `_transmission` and

@@ -17,6 +17,7 @@ fn support(name: &str) -> Option<Support> {
         | "KHR_lights_punctual"
         | "KHR_materials_clearcoat"
         | "KHR_materials_diffuse_transmission"
+        | "KHR_materials_dispersion"
         | "KHR_materials_emissive_strength"
         | "KHR_materials_ior"
         | "KHR_materials_pbrSpecularGlossiness"

@@ -217,6 +217,11 @@ impl Reader<'_> {
                 }
             }
         }
+        if let Some(dispersion) = item.extension("KHR_materials_dispersion")?
+            && material.volume.is_some()
+        {
+            layers.dispersion = dispersion.number_from("dispersion", 0.0)?.unwrap_or(0.0) as f32;
+        }
         if layers != LayerMaterial::NONE {
             material.layers = Some(Box::new(layers));
         }

@@ -134,6 +134,7 @@ static MATERIAL: Schema = Schema {
     extensions: &[
         ("KHR_materials_clearcoat", &CLEARCOAT),
         ("KHR_materials_diffuse_transmission", &DIFFUSE_TRANSMISSION),
+        ("KHR_materials_dispersion", &DISPERSION),
         ("KHR_materials_emissive_strength", &EMISSIVE_STRENGTH),
         ("KHR_materials_ior", &IOR),
         ("KHR_materials_pbrSpecularGlossiness", &SPECULAR_GLOSSINESS),
@@ -167,6 +168,8 @@ static DIFFUSE_TRANSMISSION: Schema = plain(&[
     free("diffuseTransmissionColorFactor", COLOUR),
     free("diffuseTransmissionColorTexture", Object(&TEXTURE_INFO)),
 ]);
+
+static DISPERSION: Schema = plain(&[free("dispersion", Number(0.0, MOST))]);
 
 static SHEEN: Schema = plain(&[
     free("sheenColorFactor", COLOUR),

@@ -1,5 +1,6 @@
 //! What a walk has to know of the settings.
 
+use crate::bsdf::Bsdf;
 use crate::bsdf::event::Letters;
 use crate::path::expression::error::ExpressionError;
 use crate::path::expression::language::{Language, LightTag};
@@ -7,8 +8,11 @@ use crate::path::mis::exhaustive::Chosen;
 use crate::path::mis::heuristic::Heuristic;
 use crate::path::tally::Technique;
 use crate::scene::Scene;
+use crate::scene::interaction::Interaction;
 use crate::scene::light::Light;
+use crate::scene::material::Material;
 use crate::settings::{Gloss, Method, Settings, Shadows, Shows, Strategy, Weights};
+use glam::Vec4;
 
 /// Most light subpaths of a pass of photons.
 const PHOTON_PATHS_MAX: usize = 1 << 18;
@@ -39,6 +43,8 @@ pub struct Rules {
     /// The plane of each technique that has one.
     technique_planes: Vec<(Technique, usize)>,
     narrow_plane: Option<usize>,
+    /// What a material does to light, by its number; `None` where textures tell.
+    even: Vec<Option<Bsdf>>,
 }
 
 /// How techniques share a path.
@@ -73,9 +79,12 @@ impl Rules {
         }
         let language = Language::compile(&expressions)?;
         let tags = tags(scene, &language);
+        let letters = language.letters();
+        let even = |material: &Material| Some(Bsdf::keeping(&material.even_surface()?, letters));
         Ok(Self {
-            letters: language.letters(),
+            letters,
             language,
+            even: scene.data.materials.iter().map(even).collect(),
             gloss: settings.gloss,
             bounces: settings.bounces.unwrap_or(u32::MAX),
             shadows: settings.shadows,
@@ -86,6 +95,12 @@ impl Rules {
             technique_planes,
             narrow_plane,
         })
+    }
+
+    /// What the surface does to light at a point, where that is the same all over its material.
+    #[inline]
+    pub fn even_bsdf(&self, at: &Interaction<'_>) -> Option<&Bsdf> {
+        self.even[at.material_id.index()].as_ref().filter(|_| at.at.colour == Vec4::ONE)
     }
 
     /// Number of pictures.

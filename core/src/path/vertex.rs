@@ -1,19 +1,21 @@
 //! A point of a path on a surface, and what it does to light.
 
 use crate::bsdf::Bsdf;
-use crate::bsdf::event::{Letter, Letters, SampleKind, Scattered, Transport};
+use crate::bsdf::event::{Letter, SampleKind, Scattered, Transport};
 use crate::math::colour::Rgb;
 use crate::math::cosine::cosine;
+use crate::path::rules::Rules;
 use crate::scene::interaction::Interaction;
 use crate::trace::ray::Ray;
 use glam::{Vec2, Vec3};
+use std::borrow::Cow;
 
 /// A point of a path on a surface. Directions are unit vectors away from it.
 #[derive(Clone, Debug)]
 pub struct Vertex<'s> {
     /// Where it is.
     pub at: Interaction<'s>,
-    bsdf: Bsdf,
+    bsdf: Cow<'s, Bsdf>,
     /// Back along the path, in the shading frame.
     wo: Vec3,
     /// Cosine between the way back and the geometric normal: positive on the front.
@@ -86,12 +88,21 @@ pub enum Crossing {
 
 impl<'s> Vertex<'s> {
     /// At a point that is seen along −`back`; `None` where the shading normal faces away though the surface
-    /// does not: such a point scatters nothing. Scatters by no letter but `letters`.
-    pub fn new(at: Interaction<'s>, back: Vec3, letters: Letters) -> Option<Self> {
+    /// does not: such a point scatters nothing. Scatters by no letter but those of the rules.
+    #[inline(always)]
+    pub fn new(at: Interaction<'s>, back: Vec3, rules: &'s Rules) -> Option<Self> {
         let wo = at.shading.to_local(back);
         let cos_back = back.dot(at.ng);
         let visible = wo.z * 1.0_f32.copysign(cos_back) > 0.0;
-        visible.then(|| Self { bsdf: Bsdf::keeping(&at.surface(), letters), at, wo, cos_back })
+        if !visible {
+            return None;
+        }
+        // Put together apart, because a BSDF on its way from a variable costs a copy.
+        if let Some(even) = rules.even_bsdf(&at) {
+            return Some(Self { at, bsdf: Cow::Borrowed(even), wo, cos_back });
+        }
+        let surface = at.surface();
+        Some(Self { at, bsdf: Cow::Owned(Bsdf::keeping(&surface, rules.letters)), wo, cos_back })
     }
 
     /// Unit direction back along the path.

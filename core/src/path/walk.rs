@@ -11,7 +11,7 @@ use crate::path::rules::{Rules, Weighing};
 use crate::path::tally::Tally;
 use crate::path::throughput::{State, Throughput};
 use crate::path::vertex::{Continuation, Crossing, Density, Vertex};
-use crate::sampler::{Dimension, Sampler, Use};
+use crate::sampler::{Dimension, Sampler, ScatteringNumbers, Use};
 use crate::scene::Scene;
 use crate::scene::interaction::Interaction;
 use crate::scene::view::View;
@@ -38,6 +38,8 @@ pub struct Walk<'a, S: State, T: Throughput<S>> {
     pub rules: &'a Rules,
     /// Its numbers.
     pub sampler: &'a Sampler,
+    /// Its numbers at the vertex that it is at.
+    pub numbers: ScatteringNumbers,
     /// Where it goes.
     pub edge: Edge,
     /// What a unit of light (from the eye) or of importance (from a light) at its end counts at its start.
@@ -136,6 +138,7 @@ impl<'a, S: State, T: Throughput<S>> Walk<'a, S, T> {
             scene,
             rules,
             sampler,
+            numbers: ScatteringNumbers::default(),
             edge,
             carried,
             partial,
@@ -172,7 +175,8 @@ impl<'a, S: State, T: Throughput<S>> Walk<'a, S, T> {
             if self.scatterings >= self.rules.bounces || !visitor.goes_on(&self) {
                 return;
             }
-            let Some(vertex) = Vertex::new(at, -self.edge.ray.direction, self.rules.letters) else { return };
+            let Some(vertex) = Vertex::new(at, -self.edge.ray.direction, self.rules) else { return };
+            self.numbers = self.sampler.scattering(|what| self.dimension(what));
             visitor.scatters(&self, &vertex, tally);
             if !self.scatter(&vertex, visitor) {
                 return;
@@ -238,8 +242,7 @@ impl<'a, S: State, T: Throughput<S>> Walk<'a, S, T> {
     /// Goes on from `vertex`; false where the walk ends. Roulette survives with min(1, throughput without the
     /// factors of refraction): never capped, since a cap below 1 has infinite variance where albedos are near one.
     fn scatter<V: Visitor<'a, S, T>>(&mut self, vertex: &Vertex<'_>, _: &V) -> bool {
-        let choice = self.sampler.pair(self.dimension(Use::Choice));
-        let u = self.sampler.pair(self.dimension(Use::Direction));
+        let (choice, u) = (self.numbers.choice(), self.numbers.direction());
         let Some(next) = vertex.sample(choice.x, u, self.transport) else { return false };
         self.carried = self.carried.scattered(&self.rules.language, next.weight);
         if self.carried.is_dead() {

@@ -2,7 +2,7 @@
 
 use crate::scene::bounds::Bounds;
 use crate::scene::camera::Camera;
-use crate::scene::instance::Instance;
+use crate::scene::instance::{Instance, Placement};
 use crate::scene::knots::Knots;
 use crate::scene::material::Material;
 use crate::scene::mesh::Mesh;
@@ -53,6 +53,16 @@ impl SceneData {
     pub fn moves(&self, instance: u32) -> bool {
         let Instance { mesh, placement, .. } = &self.instances[instance as usize];
         !placement.knots().is_empty() || !self.meshes[mesh.index()].forms.is_empty()
+    }
+
+    /// Keeps what points on the gathered mesh have in common by triangle: it is hit most.
+    pub fn keep_faces(&mut self) {
+        for instance in &self.instances {
+            let mesh = &mut self.meshes[instance.mesh.index()];
+            if matches!(instance.placement, Placement::World) && mesh.forms.is_empty() {
+                mesh.keep_faces();
+            }
+        }
     }
 
     /// Name of the node that a triangle of an instance comes from; may be empty.

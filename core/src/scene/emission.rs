@@ -4,9 +4,10 @@ use crate::math::colour::Rgb;
 use crate::math::frame::Frame;
 use crate::math::warp;
 use crate::scene::data::SceneData;
+use crate::scene::emitter::mesh_order;
 use crate::scene::environment::Environment;
 use crate::scene::interaction::{Interaction, Side};
-use crate::scene::light::{Light, area, mesh_order};
+use crate::scene::light::Light;
 use crate::scene::lights::Lights;
 use crate::scene::material::Sides;
 use crate::scene::punctual::PunctualKind;
@@ -69,7 +70,7 @@ impl Lights {
             Light::Triangle { instance, triangle } => {
                 let barycentric = mesh_order(data, instance, warp::triangle(u));
                 let at = data.emitter(instance, triangle, barycentric, moment);
-                (1.0 / area(data.corners(instance, triangle, moment)), Place::Surface(at))
+                (1.0 / self.emitter(data, light, moment).area(), Place::Surface(at))
             }
             Light::Punctual(index) => match data.punctual[index as usize].at(moment) {
                 kind @ (PunctualKind::Point { position, .. } | PunctualKind::Spot { position, .. }) => {
@@ -113,7 +114,7 @@ impl Lights {
         let (origin, emission) = match *self.light(light) {
             Light::Triangle { instance, triangle } => {
                 let sides = data.material(instance, triangle).sides;
-                (1.0 / area(data.corners(instance, triangle, moment)), surface_direction_pdf(sides, cos))
+                (1.0 / self.emitter(data, light, moment).area(), surface_direction_pdf(sides, cos))
             }
             Light::Punctual(index) => match &data.punctual[index as usize].kind {
                 PunctualKind::Directional { .. } => (1.0, disk_pdf(data)),

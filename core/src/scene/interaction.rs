@@ -5,7 +5,7 @@ use crate::math::colour::Rgb;
 use crate::math::frame::Frame;
 use crate::scene::data::SceneData;
 use crate::scene::instance::{Handedness, Motion, Placement};
-use crate::scene::material::{LayerMaterial, Material, Sides, SurfaceCoordinates};
+use crate::scene::material::{LayerMaterial, Material, MaterialId, Sides, SurfaceCoordinates};
 use crate::scene::mesh::Mesh;
 use crate::scene::texture::Texture;
 use crate::trace::moment::Moment;
@@ -38,6 +38,8 @@ pub struct Interaction<'a> {
     pub moment: Moment,
     /// The material.
     pub material: &'a Material,
+    /// Its number.
+    pub material_id: MaterialId,
     textures: &'a [Texture],
     point: SurfacePoint,
 }
@@ -63,9 +65,14 @@ impl SceneData {
     /// Share of what is behind that a triangle covers at a point; `barycentric` holds the weights of the
     /// second and the third corner (in the mesh's order).
     pub fn alpha(&self, instance: u32, triangle: u32, barycentric: Vec2) -> f32 {
+        let at = self.coordinates(instance, triangle, barycentric);
+        self.material(instance, triangle).alpha(&self.textures, &at)
+    }
+
+    /// Where on its textures such a point lies.
+    pub(super) fn coordinates(&self, instance: u32, triangle: u32, barycentric: Vec2) -> SurfaceCoordinates {
         let mesh = &self.meshes[self.instances[instance as usize].mesh.index()];
-        let material = &self.materials[mesh.materials[triangle as usize].index()];
-        material.alpha(&self.textures, &coordinates(mesh, triangle, weights(barycentric)))
+        coordinates(mesh, triangle, weights(barycentric))
     }
 
     /// The point of a triangle with the given weights of its second and third corner (in the mesh's order), at a moment.
@@ -110,12 +117,17 @@ impl SceneData {
     #[inline]
     fn interaction_at(&self, point: Place<'_>, placement: &Placement, normals: Normals) -> Interaction<'_> {
         let Place { mesh, triangle, weights, moment } = point;
-        let material = &self.materials[mesh.materials[triangle as usize].index()];
+        let material_id = mesh.materials[triangle as usize];
+        let material = &self.materials[material_id.index()];
         let moved = match placement {
             Placement::Moved(moved) => Some(&moved.traced),
             Placement::World | Placement::Moving(_) => None,
         };
-        let on = SurfacePoint::new(mesh.corners(triangle, moment), Vec2::new(weights.y, weights.z), moved);
+        let (vertices, barycentric) = (mesh.corners(triangle, moment), Vec2::new(weights.y, weights.z));
+        let on = match (mesh.face(triangle), moved) {
+            (Some(face), None) => SurfacePoint::on(face, vertices, barycentric, None),
+            _ => SurfacePoint::new(vertices, barycentric, moved),
+        };
         let (position, ng) = (on.position, on.normal);
         let at = coordinates(mesh, triangle, weights);
         let shading = match normals {
@@ -130,7 +142,8 @@ impl SceneData {
             }
             _ => shading.z,
         };
-        Interaction { position, ng, shading, coat, at, moment, material, textures: &self.textures, point: on }
+        let textures = &self.textures;
+        Interaction { position, ng, shading, coat, at, moment, material, material_id, textures, point: on }
     }
 }
 
@@ -263,19 +276,7 @@ impl Interaction<'_> {
 
     /// What the surface is made of here.
     pub fn surface(&self) -> SurfaceParameters {
-        let (material, textures, at) = (self.material, self.textures, &self.at);
-        let (roughness, metallic) = material.roughness_and_metallic(textures, at);
-        let (specular, specular_color) = material.dielectric(textures, at);
-        SurfaceParameters {
-            base_color: material.base(textures, at).truncate().clamp(Vec3::ZERO, Vec3::ONE),
-            metallic,
-            roughness,
-            specular,
-            specular_color,
-            ior: material.ior,
-            transmission: material.transmitted(textures, at),
-            walls: material.walls(),
-            layers: material.layers.as_ref().map(|layers| self.layers(layers)),
-        }
+        let layers = self.material.layers.as_ref().map(|layers| self.layers(layers));
+        SurfaceParameters { layers, ..self.material.surface(self.textures, &self.at) }
     }
 }

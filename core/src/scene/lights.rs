@@ -3,15 +3,17 @@
 use crate::math::choice::AliasTable;
 use crate::math::colour::{Rgb, luminance};
 use crate::scene::data::SceneData;
+use crate::scene::emitter::{Emitter, area};
 use crate::scene::environment::Environment;
 use crate::scene::interaction::Interaction;
-use crate::scene::light::{Light, NextEvent, area, triangle_pdf};
+use crate::scene::light::{Light, NextEvent};
 use crate::scene::material::{Material, Sides};
 use crate::scene::punctual::PunctualKind;
 use crate::scene::texture::Texture;
 use crate::trace::moment::Moment;
 use core::f64::consts::PI;
 use glam::{Vec2, Vec3};
+use std::borrow::Cow;
 
 /// No light has this number.
 const NONE: u32 = u32::MAX;
@@ -19,7 +21,10 @@ const NONE: u32 = u32::MAX;
 /// All lights of a scene, chosen in proportion to their power.
 #[derive(Clone, Debug, Default)]
 pub struct Lights {
+    /// Triangles first.
     all: Vec<Light>,
+    /// The triangles among them; `None` of those that move.
+    emitters: Vec<Option<Emitter>>,
     choice: AliasTable,
     /// For each instance, the light of each triangle; empty where none emits.
     by_triangle: Vec<Vec<u32>>,
@@ -30,6 +35,7 @@ impl Lights {
     /// The lights of a scene. What has no power is left out.
     pub fn new(data: &SceneData, environment: Option<&Environment>) -> Self {
         let mut lights = Vec::new();
+        let mut emitters = Vec::new();
         let mut powers = Vec::new();
         let radiances: Vec<Rgb> = data.materials.iter().map(|m| mean_radiance(m, &data.textures)).collect();
         let mut by_triangle = vec![Vec::new(); data.instances.len()];
@@ -47,6 +53,8 @@ impl Lights {
                     numbers.resize(mesh.triangles.len(), NONE);
                     numbers[t] = lights.len() as u32;
                     lights.push(Light::Triangle { instance: i as u32, triangle: t as u32 });
+                    let place = (i as u32, t as u32);
+                    emitters.push((!data.moves(place.0)).then(|| Emitter::new(data, place, Moment::STILL)));
                     powers.push(power);
                 }
             }
@@ -69,7 +77,7 @@ impl Lights {
             }
         }
         let choice = AliasTable::new(&powers).unwrap_or_default();
-        Self { all: lights, choice, by_triangle, environment: from_environment }
+        Self { all: lights, emitters, choice, by_triangle, environment: from_environment }
     }
 
     /// Number of lights.
@@ -123,8 +131,22 @@ impl Lights {
         place: Vec2,
     ) -> Option<(u32, NextEvent)> {
         let (light, probability) = self.choose(choice)?;
-        let event = self.light(light).sample(data, environment, moment, point, place)?;
+        let emitter = || self.emitter(data, light, moment);
+        let event = self.light(light).sample(data, environment, emitter, (moment, point), place)?;
         Some((light, NextEvent { pdf: event.pdf * probability, ..event }))
+    }
+
+    /// The triangle of a light at a moment; the light must be one.
+    pub(super) fn emitter(&self, data: &SceneData, light: u32, moment: Moment) -> Cow<'_, Emitter> {
+        if let Some(standing) = &self.emitters[light as usize] {
+            return Cow::Borrowed(standing);
+        }
+        match *self.light(light) {
+            Light::Triangle { instance, triangle } => {
+                Cow::Owned(Emitter::new(data, (instance, triangle), moment))
+            }
+            Light::Punctual(_) | Light::Environment => unreachable!("triangles come first"),
+        }
     }
 
     /// Density over solid angle at `point` of next events towards `at`, seen in `direction` on a triangle; zero
@@ -139,8 +161,7 @@ impl Lights {
     ) -> f32 {
         match self.of_triangle((instance, triangle)) {
             Some(light) => {
-                let pdf = triangle_pdf(data, instance, triangle, point, at, direction);
-                pdf * self.probability(light)
+                self.emitter(data, light, at.moment).pdf(point, at, direction) * self.probability(light)
             }
             None => 0.0,
         }

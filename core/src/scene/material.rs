@@ -1,6 +1,6 @@
 //! What surfaces are made of.
 
-use crate::bsdf::surface::{Layers, Walls};
+use crate::bsdf::surface::{Layers, SurfaceParameters, Walls};
 use crate::math::colour::Rgb;
 use crate::scene::texture::{Texture, TextureId};
 use glam::{Affine2, Vec2, Vec3, Vec4};
@@ -133,6 +133,8 @@ pub struct LayerMaterial {
     pub through: Textured<f32>,
     /// Its colour.
     pub through_color: Textured<Rgb>,
+    /// 20 over the Abbe number of its glass.
+    pub dispersion: f32,
 }
 
 impl LayerMaterial {
@@ -145,6 +147,7 @@ impl LayerMaterial {
         sheen_roughness: Textured::constant(0.0),
         through: Textured::constant(0.0),
         through_color: Textured::constant(Vec3::ONE),
+        dispersion: 0.0,
     };
 
     /// All texture slots.
@@ -170,6 +173,7 @@ impl LayerMaterial {
             sheen_roughness: self.sheen_roughness.factor,
             through: self.through.factor,
             through_color: self.through_color.factor,
+            dispersion: self.dispersion,
         }
     }
 
@@ -184,6 +188,7 @@ impl LayerMaterial {
             sheen_roughness: self.sheen_roughness.factor * texel(self.sheen_roughness.texture).w,
             through: self.through.factor * texel(self.through.texture).w,
             through_color: self.through_color.factor * texel(self.through_color.texture).truncate(),
+            dispersion: self.dispersion,
         }
     }
 }
@@ -266,6 +271,11 @@ impl Material {
         self.emission.factor.max_element() > 0.0
     }
 
+    /// Whether all of its surface emits alike.
+    pub fn emits_evenly(&self) -> bool {
+        self.emission.texture.is_none() && self.coverage == Coverage::Opaque
+    }
+
     /// Whether it emits by a texture, and nowhere more than a radiance of one.
     pub fn only_glows(&self) -> bool {
         self.emission.texture.is_some() && self.emission.factor.max_element() <= 1.0
@@ -345,6 +355,33 @@ impl Material {
     pub fn transmitted(&self, textures: &[Texture], at: &SurfaceCoordinates) -> f32 {
         let texel = self.transmission.texture.map_or(1.0, |slot| slot.sample(textures, at).x);
         (self.transmission.factor * texel).clamp(0.0, 1.0)
+    }
+
+    /// What the surface is made of at a point, below its layers.
+    pub fn surface(&self, textures: &[Texture], at: &SurfaceCoordinates) -> SurfaceParameters {
+        let (roughness, metallic) = self.roughness_and_metallic(textures, at);
+        let (specular, specular_color) = self.dielectric(textures, at);
+        SurfaceParameters {
+            base_color: self.base(textures, at).truncate().clamp(Vec3::ZERO, Vec3::ONE),
+            metallic,
+            roughness,
+            specular,
+            specular_color,
+            ior: self.ior,
+            transmission: self.transmitted(textures, at),
+            walls: self.walls(),
+            layers: None,
+        }
+    }
+
+    /// What the surface is made of wherever the mesh has no colours; `None` where textures tell, and of layers.
+    pub fn even_surface(&self) -> Option<SurfaceParameters> {
+        let textures = [self.base_color.texture, self.specular.texture, self.specular_color.texture];
+        let even = textures.iter().all(Option::is_none)
+            && self.transmission.texture.is_none()
+            && self.roughness_map.is_none()
+            && self.layers.is_none();
+        even.then(|| self.surface(&[], &SurfaceCoordinates { uvs: [Vec2::ZERO; 2], colour: Vec4::ONE }))
     }
 
     /// The normal that the map says, in the frame of tangent, bitangent and normal; not of unit length.

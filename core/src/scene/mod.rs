@@ -5,6 +5,7 @@ pub mod camera;
 pub mod data;
 pub mod distribution;
 pub mod emission;
+pub mod emitter;
 pub mod environment;
 pub mod importance;
 pub mod instance;
@@ -72,12 +73,17 @@ pub enum Unlit {
 
 impl Scene {
     /// Builds the trees, a mesh a thread, and gathers the lights.
-    pub fn new(data: SceneData, environment: Option<Environment>, views: Views) -> Result<Self, BuildError> {
+    pub fn new(
+        mut data: SceneData,
+        environment: Option<Environment>,
+        views: Views,
+    ) -> Result<Self, BuildError> {
         let trees = data.meshes.par_iter().map(Mesh::tree).collect::<Result<Vec<_>, _>>()?;
         let placements: Vec<Placement> = (data.instances.iter())
             .map(|i| Placement { mesh: i.mesh.0, to_world: i.placement.to_world() })
             .collect();
         let aggregate = Aggregate::moving(trees, &placements, |i| data.instances[i].placement.knots())?;
+        data.keep_faces();
         let opaque = data.materials.iter().all(|m| m.coverage == Coverage::Opaque);
         let coverage = if opaque { SceneCoverage::Opaque } else { SceneCoverage::Partly };
         let unlit = data.materials.iter().any(|m| m.unlit.is_some());

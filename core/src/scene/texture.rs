@@ -128,19 +128,26 @@ impl Wrap {
         }
     }
 
-    /// The pixel at `index`, which may lie outside 0..size.
+    /// The pixel at `index`, which may lie outside 0..size, but by no more than a reduced coordinate and its neighbours do.
     #[inline]
     fn pixel(self, index: i32, size: u32) -> u32 {
         let n = size as i32;
         match self {
-            Self::Repeat => index.rem_euclid(n) as u32,
+            Self::Repeat => once_around(index, n) as u32,
             Self::Mirror => {
-                let folded = index.rem_euclid(2 * n);
+                let folded = once_around(index, 2 * n);
                 folded.min(2 * n - 1 - folded) as u32
             }
             Self::Clamp => index.clamp(0, n - 1) as u32,
         }
     }
+}
+
+/// The remainder of an index in −n..2n by n, without a division.
+#[inline]
+fn once_around(index: i32, n: i32) -> i32 {
+    let index = if index < 0 { index + n } else { index };
+    if index < n { index } else { index - n }
 }
 
 impl Texture {
@@ -150,26 +157,35 @@ impl Texture {
         let x = self.wrap[0].reduce(uv.x) * picture.width as f32;
         let y = self.wrap[1].reduce(uv.y) * picture.height as f32;
         match self.filter {
-            Filter::Nearest => self.fetch(x.floor() as i32, y.floor() as i32),
+            Filter::Nearest => self.fetch(self.column(x.floor() as i32), self.row(y.floor() as i32)),
             Filter::Linear => {
                 let (x, y) = (x - 0.5, y - 0.5);
                 let (left, top) = (x.floor(), y.floor());
                 let (right_share, low_share) = (x - left, y - top);
                 let (left, top) = (left as i32, top as i32);
+                let columns = [self.column(left), self.column(left + 1)];
+                let rows = [self.row(top), self.row(top + 1)];
                 // Written so that equal pixels give their own value, to the bit.
                 let mix = |a: Vec4, b: Vec4, share: f32| a + (b - a) * share;
-                let upper = mix(self.fetch(left, top), self.fetch(left + 1, top), right_share);
-                let lower = mix(self.fetch(left, top + 1), self.fetch(left + 1, top + 1), right_share);
-                mix(upper, lower, low_share)
+                let across = |y| mix(self.fetch(columns[0], y), self.fetch(columns[1], y), right_share);
+                mix(across(rows[0]), across(rows[1]), low_share)
             }
         }
     }
 
     #[inline]
-    fn fetch(&self, x: i32, y: i32) -> Vec4 {
-        let picture = &*self.picture;
-        let (x, y) = (self.wrap[0].pixel(x, picture.width), self.wrap[1].pixel(y, picture.height));
-        picture.texel(self.encoding, x, y)
+    fn column(&self, index: i32) -> u32 {
+        self.wrap[0].pixel(index, self.picture.width)
+    }
+
+    #[inline]
+    fn row(&self, index: i32) -> u32 {
+        self.wrap[1].pixel(index, self.picture.height)
+    }
+
+    #[inline]
+    fn fetch(&self, x: u32, y: u32) -> Vec4 {
+        self.picture.texel(self.encoding, x, y)
     }
 
     /// The mean over all pixels: what the texture is worth when only its power counts.

@@ -35,16 +35,28 @@ impl SurfacePoint {
     /// distance along a ray is computed from all three, and with the axes apart 2 % of the light between a floor at
     /// 0 and a lamp near it was lost to hits on the floor itself. A normal that points to the front in the mesh does
     /// so in a mirrored instance.
+    #[inline]
     pub fn new(vertices: [Vec3; 3], barycentric: Vec2, moved: Option<&Moved>) -> Self {
+        Self::on(&Face::new(vertices, moved), vertices, barycentric, moved)
+    }
+
+    /// The same where the triangle's face is known.
+    #[inline]
+    pub fn on(face: &Face, vertices: [Vec3; 3], barycentric: Vec2, moved: Option<&Moved>) -> Self {
         let weights = Vec3::new(1.0 - barycentric.x - barycentric.y, barycentric.x, barycentric.y);
         let (position, error) = combine(vertices, weights, moved);
-        let edges = Edges::new(vertices, moved);
-        let mut point = Self { position, error, normal: edges.normal(moved), start: position };
-        if let Some(weights) = edges.keep_away(weights, error) {
-            let (start, error) = combine(vertices, weights, moved);
-            (point.start, point.error) = (start, error.max(point.error));
+        let mut point = Self { position, error, normal: face.normal, start: position };
+        if face.is_near_edge(weights, error) {
+            point.keep_away(vertices, weights, moved);
         }
         point
+    }
+
+    #[cold]
+    fn keep_away(&mut self, vertices: [Vec3; 3], weights: Vec3, moved: Option<&Moved>) {
+        let weights = Edges::new(vertices, moved).moved_in(weights, f64::from(self.error));
+        let (start, error) = combine(vertices, weights, moved);
+        (self.start, self.error) = (start, error.max(self.error));
     }
 
     /// Where a ray that leaves in `direction` must start so that it does not meet this surface again and stays on this
@@ -58,7 +70,7 @@ impl SurfacePoint {
 /// A weighted mean of vertices in the world, and the bound on its error.
 #[inline]
 fn combine(vertices: [Vec3; 3], weights: Vec3, moved: Option<&Moved>) -> (Vec3, f32) {
-    let [a, b, c] = [0, 1, 2].map(|i: usize| vertices[i] * weights[i]);
+    let (a, b, c) = (vertices[0] * weights.x, vertices[1] * weights.y, vertices[2] * weights.z);
     let position = a + b + c;
     let error = gamma(7.0) * (a.abs() + b.abs() + c.abs()).max_element();
     match moved {
@@ -67,6 +79,32 @@ fn combine(vertices: [Vec3; 3], weights: Vec3, moved: Option<&Moved>) -> (Vec3, 
             let (position, error) = moved.point_outward(position, Vec3::splat(error));
             (position, error.max_element())
         }
+    }
+}
+
+/// What all points of a triangle have in common: most of the work of finding one.
+#[derive(Clone, Copy, Debug)]
+pub struct Face {
+    normal: Vec3,
+    /// [`FROM_EDGES`] over the height above each edge, opposite to the vertex of its index, squared.
+    closeness: Vec3,
+}
+
+impl Face {
+    /// That of a mesh's triangle as an instance moves it.
+    #[inline]
+    pub fn new(vertices: [Vec3; 3], moved: Option<&Moved>) -> Self {
+        let edges = Edges::new(vertices, moved);
+        let [a, b, c] = edges.squares;
+        let over_area = FROM_EDGES * FROM_EDGES / edges.cross.length_squared();
+        Self { normal: edges.normal(moved), closeness: (DVec3::new(a, b, c) * over_area).as_vec3() }
+    }
+
+    /// Whether a point that is known within `error` is nearer than [`FROM_EDGES`] errors to an edge.
+    #[inline]
+    fn is_near_edge(&self, weights: Vec3, error: f32) -> bool {
+        let weights = weights.max(Vec3::ZERO);
+        (weights * weights).cmplt(self.closeness * (error * error)).any()
     }
 }
 
@@ -117,19 +155,7 @@ impl Edges {
     }
 
     /// Weights moved towards the triangle's centre until the point is [`FROM_EDGES`] errors from all edges; half way
-    /// at most, so that the points of a small triangle do not all become one. `None` where it is already.
-    #[inline]
-    fn keep_away(&self, weights: Vec3, error: f32) -> Option<Vec3> {
-        let margin = FROM_EDGES * f64::from(error);
-        let (area, margin) = (self.cross.length_squared(), margin * margin);
-        let near = |i: usize| {
-            let weight = f64::from(weights[i].max(0.0));
-            weight * weight * area < margin * self.squares[i]
-        };
-        (near(0) || near(1) || near(2)).then(|| self.moved_in(weights, f64::from(error)))
-    }
-
-    #[cold]
+    /// at most, so that the points of a small triangle do not all become one.
     fn moved_in(&self, weights: Vec3, error: f64) -> Vec3 {
         let weights = weights.as_dvec3();
         let to_centre = DVec3::splat(1.0 / 3.0) - weights;

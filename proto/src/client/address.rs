@@ -15,12 +15,11 @@ impl Address {
         let whole = if text.contains("://") { text.to_owned() } else { format!("http://{text}") };
         let mut url = Url::parse(&whole).map_err(|e| wrong(&e.to_string()))?;
         match url.scheme() {
-            "http" => {}
-            "https" => return Err(wrong("this build speaks http only")),
-            _ => return Err(wrong("write http://HOST:PORT")),
+            "http" | "https" => {}
+            _ => return Err(wrong("write http://HOST:PORT or https://HOST:PORT")),
         }
         if url.host_str().is_none_or(str::is_empty) {
-            return Err(wrong("write http://HOST:PORT"));
+            return Err(wrong("write http://HOST:PORT or https://HOST:PORT"));
         }
         url.set_query(None);
         url.set_fragment(None);
@@ -34,6 +33,13 @@ impl Address {
         let mut url = self.0.clone();
         url.set_path(&format!("{}{route}", self.0.path().trim_end_matches('/')));
         url
+    }
+
+    /// Which machine, and where on it.
+    pub fn host_and_port(&self) -> (String, u16) {
+        let host = self.0.host_str().unwrap_or_default();
+        let bare = host.trim_start_matches('[').trim_end_matches(']').to_owned();
+        (bare, self.0.port_or_known_default().unwrap_or(80))
     }
 
     /// Whether it is on this machine.
@@ -60,6 +66,7 @@ mod tests {
             ("127.0.0.1:7700", "http://127.0.0.1:7700", "http://127.0.0.1:7700/v1/jobs"),
             ("http://farm/", "http://farm", "http://farm/v1/jobs"),
             ("http://farm:80/under/it/", "http://farm/under/it", "http://farm/under/it/v1/jobs"),
+            ("https://farm", "https://farm", "https://farm/v1/jobs"),
             ("localhost:1?x#y", "http://localhost:1", "http://localhost:1/v1/jobs"),
         ] {
             let address = Address::parse(text).unwrap();
@@ -67,7 +74,7 @@ mod tests {
         }
         assert!(Address::parse("[::1]:7700").unwrap().is_loopback());
         assert!(!Address::parse("farm:7700").unwrap().is_loopback());
-        for text in ["", "http://", "https://farm", "ftp://farm", "http://a b"] {
+        for text in ["", "http://", "ftp://farm", "http://a b"] {
             assert!(Address::parse(text).is_err(), "{text}");
         }
     }

@@ -7,7 +7,10 @@ use super::{
     call::{Call, Payload, Repeat},
     error::{ClientError, innermost},
 };
-use reqwest::{Response, StatusCode, header::RETRY_AFTER};
+use reqwest::{
+    Response, StatusCode,
+    header::{AUTHORIZATION, HeaderValue, RETRY_AFTER},
+};
 use std::{
     sync::{
         Arc,
@@ -25,19 +28,26 @@ pub(super) const LONGEST_WAIT: Duration = Duration::from_secs(5);
 /// A farm that says "later than this" is not waited for.
 const RETRY_AFTER_MAX: Duration = Duration::from_mins(1);
 
+/// A place that the farm named, and that does not answer for so long, is not used.
+const ELSEWHERE: Duration = Duration::from_secs(3);
+
 /// A client of one farm; cheap to clone.
 #[derive(Clone, Debug)]
 pub struct Client {
     http: reqwest::Client,
+    /// Without anything that is only the farm's business.
+    elsewhere: reqwest::Client,
     address: Address,
     attempts: u32,
     seed: Arc<AtomicU64>,
+    token: Option<HeaderValue>,
 }
 
 impl Client {
     /// For the farm at `address`. `seed` spreads the waits of many clients.
     pub fn new(address: &str, seed: u64) -> Result<Self, ClientError> {
         let address = Address::parse(address)?;
+        super::tls::provide();
         let mut builder = reqwest::Client::builder()
             .connect_timeout(Duration::from_secs(5))
             .pool_idle_timeout(Duration::from_secs(30))
@@ -48,7 +58,33 @@ impl Client {
         }
         let wrong = |e| ClientError::Address { text: address.to_string(), reason: innermost(&e) };
         let http = builder.build().map_err(wrong)?;
-        Ok(Self { http, address, attempts: ATTEMPTS, seed: Arc::new(AtomicU64::new(seed)) })
+        let mut elsewhere = reqwest::Client::builder().connect_timeout(ELSEWHERE);
+        if address.is_loopback() {
+            elsewhere = elsewhere.no_proxy();
+        }
+        let elsewhere = elsewhere.build().map_err(wrong)?;
+        Ok(Self {
+            http,
+            elsewhere,
+            address,
+            attempts: ATTEMPTS,
+            seed: Arc::new(AtomicU64::new(seed)),
+            token: None,
+        })
+    }
+
+    /// Puts bytes where the farm said, once: `patience` is how long that may take.
+    pub async fn put_elsewhere(
+        &self,
+        url: &str,
+        bytes: bytes::Bytes,
+        patience: Duration,
+    ) -> Result<(), ClientError> {
+        let unreachable = |reason| ClientError::Unreachable { farm: host_of(url), reason };
+        let sent = self.elsewhere.put(url).timeout(patience).body(bytes).send().await;
+        let answer = sent.map_err(|e| unreachable(innermost(&e.without_url())))?;
+        let status = answer.status();
+        if status.is_success() { Ok(()) } else { Err(unreachable(format!("it answers {status}"))) }
     }
 
     /// Tries each call `attempts` times at most.
@@ -58,9 +94,32 @@ impl Client {
         self
     }
 
+    /// Shows `token` with each call.
+    #[must_use]
+    pub fn with_token(mut self, token: Option<&str>) -> Self {
+        let header = token.and_then(|token| HeaderValue::from_str(&format!("Bearer {}", token.trim())).ok());
+        self.token = header.map(|mut header| {
+            header.set_sensitive(true);
+            header
+        });
+        self
+    }
+
     /// Where the farm is.
     pub fn address(&self) -> &Address {
         &self.address
+    }
+
+    /// An error where the farm's address names a machine that nobody knows: no patience helps then.
+    pub async fn resolve(&self) -> Result<(), ClientError> {
+        let (host, port) = self.address.host_and_port();
+        let found = tokio::net::lookup_host((host.as_str(), port)).await.map(|mut found| found.next());
+        let reason = match found {
+            Ok(Some(_)) => return Ok(()),
+            Ok(None) => "its name leads nowhere".to_owned(),
+            Err(error) => error.to_string(),
+        };
+        Err(ClientError::Address { text: self.address.to_string(), reason })
     }
 
     /// A wait that starts short, its own for each use.
@@ -91,6 +150,9 @@ impl Client {
         let name = format!("{} {}", call.method, self.address.join(&call.route));
         let mut request = self.http.request(call.method.clone(), self.address.join(&call.route));
         request = request.headers(call.headers.clone()).query(&call.query);
+        if let Some(token) = &self.token {
+            request = request.header(AUTHORIZATION, token.clone());
+        }
         request = match &call.payload {
             Payload::Empty => request,
             Payload::Bytes(bytes) => request.body(bytes.clone()),
@@ -119,6 +181,11 @@ impl Client {
         let error = ClientError::Unreachable { farm: self.address.to_string(), reason };
         Failure { error, again, after: None }
     }
+}
+
+/// The part of an address that may be shown: what follows lets anybody write there.
+fn host_of(url: &str) -> String {
+    url.split('?').next().unwrap_or_default().to_owned()
 }
 
 /// A try that brought nothing.

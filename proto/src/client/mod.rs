@@ -12,6 +12,7 @@ pub mod jobs;
 pub mod pages;
 pub mod scenes;
 pub mod sse;
+pub mod tls;
 pub mod workers;
 
 #[cfg(test)]

@@ -42,6 +42,16 @@ impl Client {
         self.send(&call).await?.json().await
     }
 
+    /// Tells that a batch's partial EXR was put where its lease said, and the seconds spent on it. Twice is the
+    /// same as once, but the second time it may be there no more.
+    pub async fn handed(&self, lease: &LeaseId, seconds: f64) -> Result<Committed, ClientError> {
+        let call = Call::new(Method::POST, route::lease_sum(lease))
+            .header(HeaderName::from_static(SECONDS_HEADER), &format!("{seconds:.6}"))
+            .repeat(Repeat::Harmless)
+            .wait(COMMITTING);
+        self.send(&call).await?.json().await
+    }
+
     /// Gives a batch back.
     pub async fn give_back(&self, lease: &LeaseId, failure: &LeaseFailure) -> Result<(), ClientError> {
         let call = Call::new(Method::POST, route::lease_failure(lease)).json(failure);

@@ -29,9 +29,23 @@ impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for Document<T> {
             return Err(unsupported_media(media.as_deref(), "application/json"));
         }
         let bytes = read(request, JSON_MAX).await?;
+        // A list would be taken for the fields of a structure in their order.
+        let first = bytes.iter().find(|byte| !byte.is_ascii_whitespace());
+        let object: Option<serde_json::Value> = match first {
+            Some(b'{') => None,
+            _ => Some(serde_json::from_slice(&bytes).map_err(|error| refused(String::new(), &error))?),
+        };
+        if object.is_some() {
+            return Err(invalid(String::new(), "an object is expected here: {\"…\": …}".to_owned()));
+        }
         let mut json = serde_json::Deserializer::from_slice(&bytes);
         let document = serde_path_to_error::deserialize(&mut json).map_err(|error| {
             let pointer = pointer(error.path());
+            // Where an enumeration is expected, any other kind of value is told like broken syntax.
+            let well_formed = serde_json::from_slice::<serde::de::IgnoredAny>(&bytes).is_ok();
+            if well_formed && !error.inner().is_data() {
+                return invalid(pointer, "a value of another kind is expected here".to_owned());
+            }
             refused(pointer, error.inner())
         })?;
         json.end().map_err(|error| refused(String::new(), &error))?;
@@ -39,14 +53,18 @@ impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for Document<T> {
     }
 }
 
+fn invalid(pointer: String, detail: String) -> ApiError {
+    let (status, kind) = (StatusCode::UNPROCESSABLE_ENTITY, "invalid-document");
+    ApiError::new(status, kind, "Invalid document", detail.clone()).at(vec![fault(pointer, detail)])
+}
+
 fn refused(pointer: String, error: &serde_json::Error) -> ApiError {
     let detail = error.to_string();
-    let (status, kind, title) = if error.is_data() {
-        (StatusCode::UNPROCESSABLE_ENTITY, "invalid-document", "Invalid document")
-    } else {
-        (StatusCode::BAD_REQUEST, "malformed-json", "Malformed JSON")
-    };
-    ApiError::new(status, kind, title, detail.clone()).at(vec![fault(pointer, detail)])
+    if error.is_data() {
+        return invalid(pointer, detail);
+    }
+    let (kind, title) = ("malformed-json", "Malformed JSON");
+    ApiError::new(StatusCode::BAD_REQUEST, kind, title, detail.clone()).at(vec![fault(pointer, detail)])
 }
 
 /// RFC 6901.

@@ -1,10 +1,13 @@
 //! `/v1/jobs/{id}/error.json` and `.csv`
 
-use super::{error::Result, params::id};
+use super::{
+    error::Result,
+    params::{Named, id},
+};
 use crate::farm::Farm;
 use axum::{
     Json,
-    extract::{Path, State},
+    extract::State,
     http::header,
     response::{IntoResponse as _, Response},
 };
@@ -12,12 +15,12 @@ use ovtigre_proto::curve::{Curve, CurveRow};
 use std::{fmt::Write as _, sync::Arc};
 
 /// A job's curve.
-pub async fn json(State(farm): State<Arc<Farm>>, Path(name): Path<String>) -> Result<Json<Curve>> {
+pub async fn json(State(farm): State<Arc<Farm>>, Named(name): Named) -> Result<Json<Curve>> {
     Ok(Json(farm.curve(&id("job", &name)?).await?))
 }
 
 /// Its rows as comma-separated values (RFC 4180).
-pub async fn csv(State(farm): State<Arc<Farm>>, Path(name): Path<String>) -> Result<Response> {
+pub async fn csv(State(farm): State<Arc<Farm>>, Named(name): Named) -> Result<Response> {
     let curve = farm.curve(&id("job", &name)?).await?;
     Ok(([(header::CONTENT_TYPE, "text/csv; charset=utf-8; header=present")], table(&curve.rows))
         .into_response())

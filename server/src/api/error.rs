@@ -71,6 +71,9 @@ impl From<FarmError> for ApiError {
             FarmError::Request(faults) | FarmError::Patch(faults) => {
                 of(StatusCode::UNPROCESSABLE_ENTITY, "invalid-job", "Invalid job").at(faults)
             }
+            FarmError::Worker(faults) => {
+                of(StatusCode::UNPROCESSABLE_ENTITY, "invalid-worker", "Invalid worker").at(faults)
+            }
             FarmError::Scene(faults) => {
                 of(StatusCode::UNPROCESSABLE_ENTITY, "invalid-scene", "Invalid scene").at(faults)
             }
@@ -87,8 +90,12 @@ impl From<FarmError> for ApiError {
                 of(StatusCode::UNPROCESSABLE_ENTITY, "idempotency-key-taken", "Idempotency key taken")
             }
             FarmError::NoPicture(_) => of(StatusCode::NOT_FOUND, "no-picture-yet", "No picture yet"),
+            FarmError::NeverPicture(_) => of(StatusCode::NOT_FOUND, "no-picture", "No picture"),
             FarmError::NoLayer(_) => of(StatusCode::NOT_FOUND, "no-layer", "No such layer"),
-            FarmError::Blob(BlobError::Full) => {
+            FarmError::TooManyJobs { .. } => {
+                of(StatusCode::TOO_MANY_REQUESTS, "too-many-jobs", "Too many jobs")
+            }
+            FarmError::Full | FarmError::Blob(BlobError::Full) => {
                 of(StatusCode::INSUFFICIENT_STORAGE, "storage-full", "Storage full")
             }
             FarmError::Stopping | FarmError::Store(StoreError::Closed) => {
@@ -113,7 +120,13 @@ impl IntoResponse for ApiError {
         let status = StatusCode::from_u16(self.0.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
         let body = serde_json::to_vec(&self.0).unwrap_or_default();
         let mut response = (status, [(header::CONTENT_TYPE, MEDIA_TYPE)], body).into_response();
-        let later = matches!(self.0.kind.as_str(), "/problems/no-picture-yet" | "/problems/stopping");
+        let later = matches!(
+            self.0.kind.as_str(),
+            "/problems/no-picture-yet"
+                | "/problems/stopping"
+                | "/problems/too-many-requests"
+                | "/problems/too-many-jobs"
+        );
         if later {
             response.headers_mut().insert(header::RETRY_AFTER, HeaderValue::from_static("1"));
         }

@@ -1,9 +1,12 @@
 //! `/v1/jobs/{id}/events`
 
-use super::{error::Result, params::id};
+use super::{
+    error::{ApiError, Result},
+    params::{Named, id},
+};
 use crate::farm::{Farm, error::FarmError};
 use axum::{
-    extract::{Path, State},
+    extract::State,
     http::{HeaderMap, StatusCode},
     response::{
         IntoResponse as _, Response,
@@ -57,12 +60,12 @@ impl FromStr for Seen {
 /// A job's status whenever it changes, and each checkpoint once, from where the client was.
 pub async fn stream(
     State(farm): State<Arc<Farm>>,
-    Path(name): Path<String>,
+    Named(name): Named,
     headers: HeaderMap,
 ) -> Result<Response> {
     let id: JobId = id("job", &name)?;
-    let last = headers.get("last-event-id").and_then(|v| v.to_str().ok()?.parse::<Seen>().ok());
-    let settled = farm.live(&id).is_none();
+    let last = last_seen(&headers)?;
+    let settled = farm.meet(&id).await?.is_none();
     let mut watching = Watching::new(farm, id, last);
     watching.look().await?;
     if settled && last.is_some() && watching.events.is_empty() {
@@ -71,6 +74,14 @@ pub async fn stream(
     }
     let keep_alive = KeepAlive::new().interval(Duration::from_secs(15));
     Ok(Sse::new(events(watching)).keep_alive(keep_alive).into_response())
+}
+
+/// The last event that the client has seen. One that no event of a job has ever had is an error: to begin
+/// anew would tell everything twice, and to go on from now would miss something.
+fn last_seen(headers: &HeaderMap) -> Result<Option<Seen>> {
+    let Some(value) = headers.get("last-event-id").filter(|value| !value.is_empty()) else { return Ok(None) };
+    let seen = value.to_str().ok().and_then(|text| text.parse().ok());
+    seen.map(Some).ok_or_else(|| ApiError::header("Last-Event-ID is not the id of an event of a job"))
 }
 
 struct Watching {
@@ -101,6 +112,7 @@ impl Watching {
         let rows = self.farm.curve_rows(&self.id).await?;
         let status = self.farm.status(&self.id).await?;
         let known = (self.seen.checkpoints as usize).min(rows.len());
+        self.seen.checkpoints = known as u64;
         for row in &rows[known..] {
             self.seen.checkpoints += 1;
             // Named after the status that came before it, so that the next one is not missed.

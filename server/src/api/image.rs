@@ -2,7 +2,7 @@
 
 use super::{
     error::{ApiError, Result},
-    params::{Params, id},
+    params::{Named, Params, id},
     range::{Wanted, wanted},
     tag,
 };
@@ -13,7 +13,7 @@ use crate::farm::{
 };
 use axum::{
     body::Body,
-    extract::{Path, State},
+    extract::State,
     http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header},
     response::{IntoResponse as _, Response},
 };
@@ -26,11 +26,7 @@ use std::sync::Arc;
 const STOPS_MAX: f32 = 64.0;
 
 /// The merged picture so far.
-pub async fn exr(
-    State(farm): State<Arc<Farm>>,
-    Path(name): Path<String>,
-    headers: HeaderMap,
-) -> Result<Response> {
+pub async fn exr(State(farm): State<Arc<Farm>>, Named(name): Named, headers: HeaderMap) -> Result<Response> {
     let id: JobId = id("job", &name)?;
     let waits = wait_for_news(&farm, &id, &headers, None).await?;
     if let Some(manifest) = farm.manifest(&id).await?.filter(|m| tag::none_match(&headers, m)) {
@@ -80,7 +76,7 @@ pub struct PngParams {
 /// The merged picture so far, developed.
 pub async fn png(
     State(farm): State<Arc<Farm>>,
-    Path(name): Path<String>,
+    Named(name): Named,
     Params(params): Params<PngParams>,
     headers: HeaderMap,
 ) -> Result<Response> {

@@ -3,13 +3,14 @@
 use super::{
     body::Document,
     error::{ApiError, Result},
-    params::{Params, cursor, id, limit},
+    guard::Caller,
+    params::{Named, Params, cursor, id, limit},
     tag,
 };
 use crate::farm::{Farm, spec::JobSpec};
 use axum::{
-    Json,
-    extract::{Path, State},
+    Extension, Json,
+    extract::State,
     http::{HeaderMap, StatusCode, header},
     response::{IntoResponse as _, Response},
 };
@@ -62,6 +63,7 @@ impl From<JobSpec> for DryRun {
 /// A job is sent.
 pub async fn create(
     State(farm): State<Arc<Farm>>,
+    Extension(caller): Extension<Caller>,
     Params(params): Params<CreateParams>,
     headers: HeaderMap,
     Document(request): Document<JobRequest>,
@@ -74,7 +76,7 @@ pub async fn create(
         Some(Ok(key)) => Some(key.to_owned()),
         Some(Err(_)) => return Err(ApiError::header("Idempotency-Key is not ASCII text")),
     };
-    let status = farm.submit(request, key).await?;
+    let status = farm.submit(request, key, caller.token).await?;
     let location = [(header::LOCATION, route::job(&status.id))];
     Ok((StatusCode::ACCEPTED, location, with_tag(status)).into_response())
 }
@@ -98,20 +100,20 @@ pub async fn list(
 }
 
 /// A job.
-pub async fn get(State(farm): State<Arc<Farm>>, Path(name): Path<String>) -> Result<Response> {
+pub async fn get(State(farm): State<Arc<Farm>>, Named(name): Named) -> Result<Response> {
     Ok(with_tag(farm.status(&id("job", &name)?).await?))
 }
 
 /// A job is changed.
 pub async fn patch(
     State(farm): State<Arc<Farm>>,
-    Path(name): Path<String>,
+    Named(name): Named,
     headers: HeaderMap,
     Document(patch): Document<JobPatch>,
 ) -> Result<Response> {
     let id: JobId = id("job", &name)?;
-    let version = tag::match_version(&headers)?;
-    Ok(with_tag(farm.patch(&id, &patch, version).await?))
+    let versions = tag::match_versions(&headers)?;
+    Ok(with_tag(farm.patch(&id, &patch, versions).await?))
 }
 
 /// How a job is deleted.
@@ -125,7 +127,7 @@ pub struct DeleteParams {
 /// A job is cancelled, or removed with its files.
 pub async fn delete(
     State(farm): State<Arc<Farm>>,
-    Path(name): Path<String>,
+    Named(name): Named,
     Params(params): Params<DeleteParams>,
 ) -> Result<Response> {
     let id: JobId = id("job", &name)?;

@@ -3,12 +3,12 @@
 use super::{
     body::{Document, Partial},
     error::{ApiError, Result},
-    params::id,
+    params::{Named, id},
 };
 use crate::farm::Farm;
 use axum::{
     Json,
-    extract::{Path, State},
+    extract::State,
     http::{HeaderMap, StatusCode},
 };
 use ovtigre_proto::lease::{Committed, LeaseFailure, SECONDS_HEADER};
@@ -17,11 +17,21 @@ use std::{sync::Arc, time::Duration};
 /// A batch's sum.
 pub async fn sum(
     State(farm): State<Arc<Farm>>,
-    Path(name): Path<String>,
+    Named(name): Named,
     headers: HeaderMap,
     Partial(bytes): Partial,
 ) -> Result<Json<Committed>> {
     let commit = farm.commit(&id("lease", &name)?, bytes, seconds(&headers)?).await?;
+    Ok(Json(Committed { commit }))
+}
+
+/// A batch's sum was put where its lease said.
+pub async fn handed(
+    State(farm): State<Arc<Farm>>,
+    Named(name): Named,
+    headers: HeaderMap,
+) -> Result<Json<Committed>> {
+    let commit = farm.commit_handed(&id("lease", &name)?, seconds(&headers)?).await?;
     Ok(Json(Committed { commit }))
 }
 
@@ -36,7 +46,7 @@ fn seconds(headers: &HeaderMap) -> Result<Duration> {
 /// A batch is given back.
 pub async fn failure(
     State(farm): State<Arc<Farm>>,
-    Path(name): Path<String>,
+    Named(name): Named,
     Document(failure): Document<LeaseFailure>,
 ) -> Result<StatusCode> {
     farm.give_back(&id("lease", &name)?, failure).await?;

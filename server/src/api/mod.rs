@@ -5,12 +5,14 @@ pub mod carry_out;
 pub mod curve;
 pub mod error;
 pub mod events;
+pub mod guard;
 pub mod health;
 pub mod image;
 pub mod jobs;
 pub mod leases;
 pub mod params;
 pub mod range;
+pub mod roles;
 pub mod scenes;
 pub mod tag;
 pub mod workers;
@@ -23,10 +25,12 @@ use axum::{
     Router, middleware,
     routing::{get, post, put},
 };
+use guard::{Guard, Guarding};
 use std::sync::Arc;
 
-/// All doors of a farm.
-pub fn router(farm: Arc<Farm>) -> Router {
+/// All doors of a farm; who is let in says `guarding`.
+pub fn router(farm: Arc<Farm>, guarding: Guarding) -> Router {
+    let guard = Arc::new(Guard::new(Arc::clone(&farm), guarding));
     Router::new()
         .route("/v1/scenes", post(scenes::create))
         .route("/v1/scenes/{id}", put(scenes::put).get(scenes::get))
@@ -41,7 +45,7 @@ pub fn router(farm: Arc<Farm>) -> Router {
         .route("/v1/workers", post(workers::join).get(workers::list))
         .route("/v1/workers/{id}", get(workers::get).delete(workers::drain))
         .route("/v1/workers/{id}/exchange", post(workers::exchange))
-        .route("/v1/leases/{id}/sum", put(leases::sum))
+        .route("/v1/leases/{id}/sum", put(leases::sum).post(leases::handed))
         .route("/v1/leases/{id}/failure", post(leases::failure))
         .route("/v1/scaling", get(health::scaling))
         .route("/healthz", get(health::alive))
@@ -51,5 +55,6 @@ pub fn router(farm: Arc<Farm>) -> Router {
         .fallback(error::no_route)
         .method_not_allowed_fallback(error::no_method)
         .layer(middleware::from_fn(carry_out::carry_out))
+        .layer(middleware::from_fn_with_state(guard, guard::guard))
         .with_state(farm)
 }

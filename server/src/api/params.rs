@@ -2,11 +2,26 @@
 
 use super::error::ApiError;
 use axum::{
-    extract::{FromRequestParts, Query},
-    http::request::Parts,
+    extract::{FromRequestParts, Path, Query},
+    http::{StatusCode, request::Parts},
 };
 use serde::{Deserialize, de::DeserializeOwned};
 use std::str::FromStr;
+
+/// The one name in a path.
+#[derive(Debug)]
+pub struct Named(pub String);
+
+impl<S: Send + Sync> FromRequestParts<S> for Named {
+    type Rejection = ApiError;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ApiError> {
+        Path::from_request_parts(parts, state).await.map(|Path(name)| Self(name)).map_err(|error| {
+            let detail = format!("the path cannot be read: {}", error.body_text());
+            ApiError::new(StatusCode::BAD_REQUEST, "invalid-path", "Invalid path", detail)
+        })
+    }
+}
 
 /// A query as what it says.
 #[derive(Debug)]

@@ -27,13 +27,20 @@ pub fn wanted(headers: &HeaderMap, size: u64, tag: &str) -> Wanted {
     let Some((first, last)) = range.split_once('-').filter(|_| !range.contains(',')) else {
         return Wanted::Whole;
     };
-    let part = match (first.trim().parse::<u64>(), last.trim().parse::<u64>()) {
-        (Ok(first), Ok(last)) if first <= last => first..last.saturating_add(1).min(size),
-        (Ok(first), Err(_)) if last.trim().is_empty() => first..size,
-        (Err(_), Ok(length)) if first.trim().is_empty() => size.saturating_sub(length)..size,
+    let part = match (number(first), number(last)) {
+        (Some(first), Some(last)) if first <= last => first..last.saturating_add(1).min(size),
+        (Some(first), None) if last.trim().is_empty() => first..size,
+        (None, Some(length)) if first.trim().is_empty() => size.saturating_sub(length)..size,
         _ => return Wanted::Whole,
     };
     if part.is_empty() { Wanted::Nothing } else { Wanted::Part(part) }
+}
+
+/// Digits as a number; one that is too large for any file is as large as can be.
+fn number(text: &str) -> Option<u64> {
+    let text = text.trim();
+    let digits = !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
+    digits.then(|| text.parse().unwrap_or(u64::MAX))
 }
 
 #[cfg(test)]
@@ -58,6 +65,11 @@ mod tests {
             ("bytes=8-99", Wanted::Part(8..10)),
             ("bytes=10-", Wanted::Nothing),
             ("bytes=-0", Wanted::Nothing),
+            ("bytes=99999999999999999999-", Wanted::Nothing),
+            ("bytes=99999999999999999999-99999999999999999999", Wanted::Nothing),
+            ("bytes=8-99999999999999999999", Wanted::Part(8..10)),
+            ("bytes=-99999999999999999999", Wanted::Part(0..10)),
+            ("bytes=+1-+2", Wanted::Whole),
             ("bytes=5-3", Wanted::Whole),
             ("bytes=0-1,4-5", Wanted::Whole),
             ("lines=0-1", Wanted::Whole),

@@ -3,14 +3,14 @@
 use super::{
     body::{File, cut_off},
     error::{ApiError, Result},
-    params::id,
+    params::{Named, id},
     tag,
 };
 use crate::farm::{Farm, scene::Novelty};
 use axum::{
     Json,
     body::{Body, HttpBody as _},
-    extract::{Path, State},
+    extract::State,
     http::{HeaderMap, StatusCode, header},
     response::{IntoResponse as _, Response},
 };
@@ -24,11 +24,7 @@ pub async fn create(State(farm): State<Arc<Farm>>, File(body): File) -> Result<R
 }
 
 /// An upload under its hash.
-pub async fn put(
-    State(farm): State<Arc<Farm>>,
-    Path(name): Path<String>,
-    File(body): File,
-) -> Result<Response> {
+pub async fn put(State(farm): State<Arc<Farm>>, Named(name): Named, File(body): File) -> Result<Response> {
     let named: BlobId = name.parse().map_err(|_| {
         let detail = format!(
             "'{}' is not a BLAKE3 hash of 64 hexadecimal digits",
@@ -74,14 +70,14 @@ async fn upload(farm: &Farm, body: Body, named: Option<BlobId>) -> Result<Respon
 }
 
 /// What is in an uploaded file.
-pub async fn get(State(farm): State<Arc<Farm>>, Path(name): Path<String>) -> Result<Json<SceneReport>> {
+pub async fn get(State(farm): State<Arc<Farm>>, Named(name): Named) -> Result<Json<SceneReport>> {
     Ok(Json(farm.scene(&id("scene", &name)?).await?))
 }
 
 /// An uploaded file's bytes.
 pub async fn bytes(
     State(farm): State<Arc<Farm>>,
-    Path(name): Path<String>,
+    Named(name): Named,
     headers: HeaderMap,
 ) -> Result<Response> {
     let id: BlobId = id("scene", &name)?;

@@ -21,17 +21,24 @@ pub fn none_match(headers: &HeaderMap, tag: &str) -> bool {
         .any(|one| one == "*" || one.strip_prefix("W/").unwrap_or(one).trim_matches('"') == tag)
 }
 
-/// The version in `If-Match`, which is compared strongly; `None` where any will do.
-pub fn match_version(headers: &HeaderMap) -> Result<Option<u64>, ApiError> {
-    let Some(value) = headers.get(header::IF_MATCH) else { return Ok(None) };
-    let text = value.to_str().unwrap_or("").trim();
-    if text == "*" {
+/// The versions in `If-Match`; `None` where any will do. They are compared strongly (RFC 9110 §13.1.1), so
+/// that weak tags, and tags of other things, are no version of a job.
+pub fn match_versions(headers: &HeaderMap) -> Result<Option<Vec<u64>>, ApiError> {
+    let mut tags = Vec::new();
+    for value in headers.get_all(header::IF_MATCH) {
+        tags.extend(value.to_str().unwrap_or("?").split(',').map(str::trim).filter(|tag| !tag.is_empty()));
+    }
+    if tags.is_empty() || tags.contains(&"*") {
         return Ok(None);
     }
-    let version = text.strip_prefix('"').and_then(|t| t.strip_suffix('"')).and_then(|t| t.parse().ok());
-    version.map(Some).ok_or_else(|| {
-        ApiError::header("If-Match is not the ETag of a job: send that of GET /v1/jobs/{id}, with its quotes")
-    })
+    let quoted = |tag: &str| tag.len() > 1 && tag.starts_with('"') && tag.ends_with('"');
+    if tags.iter().any(|tag| !quoted(tag.strip_prefix("W/").unwrap_or(tag))) {
+        return Err(ApiError::header(
+            "If-Match is not the ETag of a job: send that of GET /v1/jobs/{id}, with its quotes",
+        ));
+    }
+    let strong = tags.iter().filter_map(|tag| tag.strip_prefix('"')?.strip_suffix('"')?.parse().ok());
+    Ok(Some(strong.collect()))
 }
 
 /// `Prefer: wait=N` (RFC 7240).

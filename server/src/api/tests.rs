@@ -1,7 +1,15 @@
 //! The doors, without a network: statuses, problems, tags, ranges, pages, events.
 
-use super::router;
+use super::{
+    guard::{Guarding, WithoutTokens, hash},
+    roles::{Access, DOORS},
+    router,
+};
 use crate::farm::tests::bench::{Bench, Spread, partial, rules, sum};
+use crate::{
+    farm::error::FarmError,
+    store::row::{Role, TokenRow},
+};
 use axum::{
     Router,
     body::Body,
@@ -10,6 +18,7 @@ use axum::{
 use futures::StreamExt as _;
 use ovtigre_proto::{
     id::JobId,
+    job::JobRequest,
     lease::{Committed, ExchangeReply, WorkerJoined},
     problem::Problem,
     status::JobState,
@@ -50,8 +59,12 @@ struct Doors {
 
 impl Doors {
     async fn open() -> Self {
+        Self::guarded(Guarding::default()).await
+    }
+
+    async fn guarded(guarding: Guarding) -> Self {
         let bench = Bench::new(rules()).await;
-        let router = router(Arc::clone(&bench.farm));
+        let router = router(Arc::clone(&bench.farm), guarding);
         Self { bench, router }
     }
 
@@ -117,7 +130,8 @@ async fn a_job_is_rendered_over_http_alone() {
     let image = format!("/v1/jobs/{job}/image.exr");
     doors.get(&image).await.problem(404, "no-picture-yet");
 
-    let join = json!({"name": "w", "threads": 1, "build": "0", "instruction_set": "any"});
+    let join =
+        json!({"name": "w", "threads": 1, "build": env!("CARGO_PKG_VERSION"), "instruction_set": "any"});
     let joined = doors.post("/v1/workers", &join).await;
     assert_eq!(joined.status, StatusCode::CREATED);
     let worker = serde_json::from_slice::<WorkerJoined>(&joined.body).unwrap().id;
@@ -157,6 +171,9 @@ async fn every_error_is_a_problem_document() {
     doors.get("/v1/jobs/none/image.exr").await.problem(404, "not-found");
     doors.get("/v1/jobs/none/events").await.problem(404, "not-found");
     doors.get("/v1/scenes/zz").await.problem(404, "not-found");
+    doors.get("/v1/jobs/%ff").await.problem(400, "invalid-path");
+    doors.get("/v1/scenes/%c3%28/bytes").await.problem(400, "invalid-path");
+    doors.send(Method::PUT, "/v1/leases/%fe/sum", &[], "x").await.problem(400, "invalid-path");
     doors.get("/v1/jobs?limit=0").await.problem(400, "invalid-parameter");
     doors.get("/v1/jobs?limit=many").await.problem(400, "invalid-parameter");
     doors.get("/v1/jobs?cursor=x").await.problem(400, "invalid-parameter");
@@ -176,6 +193,12 @@ async fn every_error_is_a_problem_document() {
         (r#"{"layers": ["a", 3]}"#, "/layers/1"),
         (r#"{"scene": "xyz"}"#, "/scene"),
         (r#""x""#, ""),
+        ("[]", ""),
+        (r#"["abc"]"#, ""),
+        ("null", ""),
+        (r#"{"method": 3}"#, "/method"),
+        (r#"{"weights": [1]}"#, "/weights"),
+        (r#"{"shadows": {"a": 1}}"#, "/shadows"),
     ] {
         let answer = doors.send(Method::POST, "/v1/jobs", &[json], document).await;
         let problem = answer.problem(422, "invalid-document");
@@ -332,11 +355,23 @@ async fn a_job_is_sent_once_checked_changed_and_cancelled() {
     patch(&tag, json!({"priority": 4})).await.problem(412, "changed-since");
     patch("*", json!({"state": "done"})).await.problem(422, "invalid-job");
     patch("3", json!({})).await.problem(400, "invalid-header");
+    let weak = format!("W/{}", changed.head("etag"));
+    patch(&weak, json!({"priority": 4})).await.problem(412, "changed-since");
+    patch("\"of something else\"", json!({"priority": 4})).await.problem(412, "changed-since");
+    let several = format!("\"0\", {}", changed.head("etag"));
+    assert_eq!(patch(&several, json!({"priority": 3})).await.status, StatusCode::OK);
+    patch("*", json!({"samples": "many"})).await.problem(422, "invalid-document");
+    let fewer = patch("*", json!({"samples": 1})).await.problem(422, "invalid-job");
+    assert_eq!(fewer.errors[0].pointer, "/samples");
     assert_eq!(patch("*", json!({"state": "paused"})).await.json()["state"], "paused");
 
     let cancelled = doors.send(Method::DELETE, &path, &[], "").await;
     assert_eq!((cancelled.status, cancelled.json()["state"].as_str()), (StatusCode::OK, Some("cancelled")));
     patch("*", json!({"priority": 4})).await.problem(409, "job-over");
+    doors.bench.until_settled(&path[9..].parse().unwrap(), JobState::Cancelled).await;
+    let never = doors.get(&format!("{path}/image.exr")).await;
+    assert!(!never.problem(404, "no-picture").detail.contains("later"));
+    assert_eq!(never.head("retry-after"), "");
     let purged = doors.send(Method::DELETE, &format!("{path}?purge=true"), &[], "").await;
     assert_eq!(purged.status, StatusCode::NO_CONTENT);
     doors.get(&path).await.problem(404, "not-found");
@@ -394,6 +429,12 @@ async fn events_tell_each_checkpoint_once_and_go_on_where_a_client_was() {
     }
     let (status, rest) = events(&doors, &path, Some(&seen.last().unwrap().0)).await;
     assert_eq!((status, rest.len()), (StatusCode::NO_CONTENT, 0));
+    for bogus in ["x", "1.2", "1.2.99999999999999999999", "-1.0.0"] {
+        let answer = doors.send(Method::GET, &path, &[("last-event-id", bogus)], "").await;
+        answer.problem(400, "invalid-header");
+    }
+    let (status, _) = events(&doors, &path, Some("9.999.9")).await;
+    assert_eq!(status, StatusCode::OK, "one that is not yet is no reason to fall");
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -412,4 +453,185 @@ async fn probes_and_numbers_are_told() {
     assert!(doors.get("/").await.head("content-type").starts_with("text/html"));
     doors.bench.farm.stopping.cancel();
     doors.get("/readyz").await.problem(503, "stopping");
+}
+
+impl Doors {
+    async fn token(&self, role: Role) -> String {
+        let token = format!("secret-{}", role.name());
+        let row = TokenRow {
+            id: format!("t-{}", role.name()),
+            name: role.name().to_owned(),
+            role,
+            hash: hash(&token),
+            created_at: None,
+        };
+        self.bench.farm.store.add_token(row).await.unwrap();
+        token
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn every_door_is_open_to_its_roles_and_to_nobody_else() {
+    let doors = Doors::guarded(Guarding { requests_per_second: 1e6, ..Guarding::default() }).await;
+    let mut tokens = Vec::new();
+    for role in Role::ALL {
+        tokens.push((role, doors.token(role).await));
+    }
+    for (method, path, access) in DOORS {
+        // Of things that are not there: whoever is let in hears that, and nothing is changed.
+        let path = path.replace("{id}", &"0".repeat(64));
+        let send = async |head: &[(&str, &str)]| doors.send(method.clone(), &path, head, "").await;
+        let strangers =
+            [vec![], vec![("authorization", "Bearer wrong")], vec![("authorization", "Basic c2VjcmV0")]];
+        for head in strangers {
+            let answer = send(&head).await;
+            if access == Access::Open {
+                assert!(answer.status.is_success(), "{method} {path}");
+            } else {
+                answer.problem(401, "unauthorized");
+                assert!(answer.head("www-authenticate").starts_with("Bearer"));
+            }
+        }
+        for (role, token) in &tokens {
+            let bearer = format!("Bearer {token}");
+            let answer = send(&[("authorization", &bearer)]).await;
+            if access.allows(*role) {
+                assert!(![401, 403, 500].contains(&answer.status.as_u16()), "{method} {path} {role:?}");
+            } else {
+                answer.problem(403, "forbidden");
+            }
+        }
+    }
+    // A table of its own, so that a slip in the list of doors is seen.
+    let expected = [
+        (Role::Submit, "submit read files"),
+        (Role::Read, "read files"),
+        (Role::Work, "work files"),
+        (Role::Admin, "submit read files work admin"),
+    ];
+    let may = |role, method: Method, path: &str| super::roles::access(&method, path).allows(role);
+    for (role, words) in expected {
+        for (word, method, path) in [
+            ("submit", Method::POST, "/v1/jobs"),
+            ("submit", Method::DELETE, "/v1/jobs/{id}"),
+            ("submit", Method::PUT, "/v1/scenes/{id}"),
+            ("read", Method::GET, "/v1/jobs/{id}/image.exr"),
+            ("read", Method::GET, "/metrics"),
+            ("files", Method::GET, "/v1/scenes/{id}/bytes"),
+            ("work", Method::POST, "/v1/workers/{id}/exchange"),
+            ("work", Method::PUT, "/v1/leases/{id}/sum"),
+            ("admin", Method::DELETE, "/v1/workers/{id}"),
+            ("admin", Method::PUT, "/v1/jobs"),
+        ] {
+            let listed = words.split(' ').any(|w| w == word);
+            assert_eq!(may(role, method, path), listed, "{role:?} {path}");
+        }
+    }
+    assert!(doors.bench.farm.store.remove_token("t-read").await.unwrap());
+    tokio::time::sleep(Duration::from_millis(1100)).await;
+    let revoked = [("authorization", "Bearer secret-read")];
+    doors.send(Method::GET, "/v1/jobs", &revoked, "").await.problem(401, "unauthorized");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn every_route_is_in_the_list_of_doors() {
+    let source = include_str!("mod.rs");
+    let mut routes = 0;
+    for line in source.lines().filter_map(|line| line.trim().strip_prefix(".route(\"")) {
+        let (path, verbs) = line.split_once('"').unwrap();
+        for (verb, method) in [
+            ("get(", Method::GET),
+            ("post(", Method::POST),
+            ("put(", Method::PUT),
+            ("patch(", Method::PATCH),
+            ("delete(", Method::DELETE),
+        ] {
+            let there = verbs.contains(&format!(" {verb}")) || verbs.contains(&format!(".{verb}"));
+            assert_eq!(there, DOORS.iter().any(|(m, p, _)| *m == method && *p == path), "{method} {path}");
+            routes += usize::from(there);
+        }
+    }
+    assert_eq!(routes, DOORS.len());
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_farm_that_all_can_reach_lets_nobody_in_without_a_token() {
+    let doors =
+        Doors::guarded(Guarding { without_tokens: WithoutTokens::Refuse, ..Guarding::default() }).await;
+    doors.get("/v1/jobs").await.problem(401, "unauthorized");
+    assert_eq!(doors.get("/healthz").await.status, StatusCode::OK);
+    doors.get("/v1/nothing").await.problem(404, "not-found");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn calls_by_foreign_names_and_from_foreign_pages_are_refused() {
+    let hosts = vec!["farm.example".to_owned()];
+    let doors = Doors::guarded(Guarding { hosts, ..Guarding::default() }).await;
+    for (host, let_in) in [
+        ("127.0.0.1:7700", true),
+        ("localhost", true),
+        ("[::1]:7700", true),
+        ("FARM.example:80", true),
+        ("evil.example:7700", false),
+        ("localhost.evil.example", false),
+    ] {
+        let answer = doors.send(Method::GET, "/v1/jobs", &[("host", host)], "").await;
+        assert_eq!(answer.status.is_success(), let_in, "{host}");
+        if !let_in {
+            answer.problem(421, "wrong-host");
+        }
+    }
+    let post = async |origin: &str| {
+        let heads = [("host", "localhost:7700"), ("origin", origin), ("content-type", "application/json")];
+        doors.send(Method::POST, "/v1/jobs", &heads, "{}").await
+    };
+    post("http://localhost:7700").await.problem(422, "invalid-job");
+    for origin in ["http://evil.example", "null", "http://localhost:7701", ""] {
+        post(origin).await.problem(403, "other-origin");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn one_token_may_not_have_it_all() {
+    let doors = Doors::guarded(Guarding { requests_per_second: 5.0, ..Guarding::default() }).await;
+    let submit = format!("Bearer {}", doors.token(Role::Submit).await);
+    let read = format!("Bearer {}", doors.token(Role::Read).await);
+    let work = format!("Bearer {}", doors.token(Role::Work).await);
+    let get = async |token: &str| doors.send(Method::GET, "/v1/jobs", &[("authorization", token)], "").await;
+    let mut statuses = Vec::new();
+    for _ in 0..12 {
+        statuses.push(get(&submit).await);
+    }
+    let late = statuses.iter().find(|answer| answer.status == StatusCode::TOO_MANY_REQUESTS).unwrap();
+    late.problem(429, "too-many-requests");
+    assert_eq!(late.head("retry-after"), "1");
+    assert!(statuses.iter().filter(|answer| answer.status == StatusCode::OK).count() >= 5);
+    assert_eq!(get(&read).await.status, StatusCode::OK, "another token has its own");
+    let beat = "/v1/workers/none/exchange";
+    for _ in 0..12 {
+        let heads = [("authorization", work.as_str()), ("content-type", "application/json")];
+        doors.send(Method::POST, beat, &heads, "{}").await.problem(404, "not-found");
+    }
+    tokio::time::sleep(Duration::from_millis(1100)).await;
+    assert_eq!(get(&submit).await.status, StatusCode::OK, "and later it may again");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_token_has_a_number_of_jobs_and_keys_of_its_own() {
+    let bench = Bench::new(crate::farm::rules::Rules { jobs_per_token: 2, ..rules() }).await;
+    let scene = Some(bench.scene().await);
+    let request =
+        || JobRequest { scene: scene.clone(), size: Some("8x8".parse().unwrap()), ..Default::default() };
+    let submit = async |key: &str, owner: &str| {
+        bench.farm.submit(request(), Some(key.to_owned()), Some(owner.to_owned())).await
+    };
+    let first = submit("a", "anna").await.unwrap();
+    assert_eq!(submit("a", "anna").await.unwrap().id, first.id);
+    submit("b", "anna").await.unwrap();
+    let refused = submit("c", "anna").await.unwrap_err();
+    assert!(matches!(refused, FarmError::TooManyJobs { most: 2 }), "{refused}");
+    assert_ne!(submit("a", "otto").await.unwrap().id, first.id, "another's keys are another's");
+    bench.farm.cancel(&first.id).await.unwrap();
+    bench.until_settled(&first.id, JobState::Cancelled).await;
+    submit("c", "anna").await.unwrap();
 }

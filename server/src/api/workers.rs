@@ -3,12 +3,12 @@
 use super::{
     body::Document,
     error::Result,
-    params::{PageParams, Params, cursor, id, limit},
+    params::{Named, PageParams, Params, cursor, id, limit},
 };
 use crate::farm::Farm;
 use axum::{
     Json,
-    extract::{Path, State},
+    extract::State,
     http::{StatusCode, header},
     response::{IntoResponse as _, Response},
 };
@@ -36,19 +36,19 @@ pub async fn list(
 }
 
 /// A worker.
-pub async fn get(State(farm): State<Arc<Farm>>, Path(name): Path<String>) -> Result<Json<WorkerStatus>> {
+pub async fn get(State(farm): State<Arc<Farm>>, Named(name): Named) -> Result<Json<WorkerStatus>> {
     Ok(Json(farm.worker(&id("worker", &name)?).await?))
 }
 
 /// A worker gets no more batches.
-pub async fn drain(State(farm): State<Arc<Farm>>, Path(name): Path<String>) -> Result<Json<WorkerStatus>> {
+pub async fn drain(State(farm): State<Arc<Farm>>, Named(name): Named) -> Result<Json<WorkerStatus>> {
     Ok(Json(farm.drain(&id("worker", &name)?).await?))
 }
 
 /// A worker's beat.
 pub async fn exchange(
     State(farm): State<Arc<Farm>>,
-    Path(name): Path<String>,
+    Named(name): Named,
     Document(said): Document<Exchange>,
 ) -> Result<Json<ExchangeReply>> {
     Ok(Json(farm.exchange(&id("worker", &name)?, said).await?))

@@ -4,7 +4,10 @@ use super::{
     exit::{CommandError, Outcome},
     local_workers::{LocalWorkers, Team, WorkerLog},
 };
-use ovtigre::serve::{ServeConfig, Serving, start};
+use ovtigre::{
+    farm::rules::Rules,
+    serve::{ServeConfig, Serving, start},
+};
 use std::{
     net::{Ipv4Addr, SocketAddr},
     num::NonZeroUsize,
@@ -46,13 +49,16 @@ impl Embedded {
                 made.map_err(|e| CommandError::wrong(format!("cannot make a temporary folder: {e}")))?;
             folder.insert(made).path().to_owned()
         };
+        // A folder that goes with the farm keeps no sums for more samples.
+        let kept_sums_bytes = if folder.is_some() { 0 } else { Rules::default().kept_sums_bytes };
         let cache = data.join("worker-scenes");
         let listen = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
-        let serving =
-            start(ServeConfig { listen, data }).await.map_err(|e| CommandError::failed(e.to_string()))?;
+        let rules = Rules { kept_sums_bytes, ..Rules::default() };
+        let config = ServeConfig { rules, ..ServeConfig::new(listen, data) };
+        let serving = start(config).await.map_err(|e| CommandError::wrong(e.to_string()))?;
         let threads = plan.threads.map_or_else(|| share_of_cores(plan.workers), NonZeroUsize::get);
         let farm = serving.address;
-        let team = Team { count: plan.workers, threads, farm, cache, log: plan.log };
+        let team = Team { token: None, count: plan.workers, threads, farm, cache, log: plan.log };
         let workers = LocalWorkers::start(&team)?;
         Ok(Self { workers, serving, _folder: folder })
     }

@@ -11,6 +11,9 @@ pub(crate) struct FarmFlags {
     /// The farm's address.
     #[arg(long, value_name = "URL", default_value = "http://127.0.0.1:7700")]
     pub(crate) server: String,
+    /// Token that the farm knows [default: the environment's OVTIGRE_TOKEN].
+    #[arg(long, value_name = "TOKEN")]
+    pub(crate) token: Option<String>,
     /// Print JSON.
     #[arg(long)]
     pub(crate) json: bool,
@@ -19,11 +22,13 @@ pub(crate) struct FarmFlags {
 impl FarmFlags {
     /// A client of it.
     pub(crate) fn client(&self) -> Outcome<Client> {
-        client(&self.server)
+        client(&self.server, self.token.as_deref())
     }
 }
 
-/// A client of the farm at `address`.
-pub(crate) fn client(address: &str) -> Outcome<Client> {
-    Ok(Client::new(address, u64::from(id()))?)
+/// A client of the farm at `address`, with `token` or that of the environment.
+pub(crate) fn client(address: &str, token: Option<&str>) -> Outcome<Client> {
+    let client = Client::new(address, u64::from(id()))?;
+    let of_environment = std::env::var("OVTIGRE_TOKEN").ok().filter(|token| !token.is_empty());
+    Ok(client.with_token(token.or(of_environment.as_deref())))
 }

@@ -10,11 +10,11 @@ impl Interrupt {
     /// Listens from now on, instead of ending the process.
     pub(crate) fn listen() -> Self {
         let bell = Bell::default();
-        tokio::spawn(bell.clone().ring_on_signals());
+        tokio::spawn(bell.clone().ring_on_signals(Leave::AfterBatch));
         Self(bell)
     }
 
-    /// Returns after the first Ctrl-C or SIGTERM.
+    /// Returns after the first Ctrl-C, SIGTERM or SIGHUP.
     pub(crate) async fn once(&self) {
         self.0.wait(Leave::AfterBatch).await;
     }

@@ -90,6 +90,18 @@ pub(crate) struct JobFlags {
     /// Render this part of the frame, in pixels from the top left [default: all].
     #[arg(long, value_name = "X,Y,W,H")]
     pub(crate) region: Option<Region>,
+    /// Jobs of a higher priority go first [default: 0].
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    pub(crate) priority: Option<i32>,
+    /// Share of batches among jobs of one priority, in proportion [default: 1].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub(crate) weight: Option<u32>,
+    /// Only workers with this tag get batches; repeatable, all are needed.
+    #[arg(long = "tag", value_name = "TAG")]
+    pub(crate) tags: Vec<String>,
+    /// Workers that hold batches of the job at a time, at most [default: any number].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) max_workers: Option<u32>,
     /// Write error against run time and how the job ended to this file.
     #[arg(long, value_name = "FILE.json")]
     pub(crate) report: Option<PathBuf>,
@@ -128,7 +140,10 @@ impl JobFlags {
             seed: self.seed,
             replicates: self.replicates,
             region: self.region,
-            priority: None,
+            priority: self.priority,
+            weight: self.weight,
+            tags: self.tags.clone(),
+            max_workers: self.max_workers,
         }
     }
 }
@@ -158,14 +173,7 @@ fn shutter(text: &str) -> Result<[f64; 2], String> {
 }
 
 fn paths(text: &str) -> Result<String, String> {
-    match Language::compile(&[text]) {
-        Ok(_) => Ok(text.to_owned()),
-        Err(error) => {
-            let marked = error.marked();
-            let lines: Vec<String> = marked.lines().map(|line| format!("  {line}")).collect();
-            Err(format!("{error}\n{}", lines.join("\n")))
-        }
-    }
+    Language::compile(&[text]).map(|_| text.to_owned()).map_err(|error| error.to_string())
 }
 
 /// What a technique makes of a layer is for the farm to judge.

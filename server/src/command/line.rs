@@ -2,7 +2,7 @@
 
 use super::{
     bake, cancel, check, compare, exit::Outcome, fetch, pause, render, resume, serve, status, submit,
-    terminal, watch, work, workers,
+    terminal, token, watch, work, workers,
 };
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -39,6 +39,8 @@ enum Command {
     Cancel(cancel::Cancel),
     /// Show who works.
     Workers(workers::Workers),
+    /// Make, list and revoke the tokens of a farm.
+    Token(token::Token),
     /// Say what is in a scene, what a render of it needs and leaves out, and every problem.
     Check(check::Check),
     /// Solve the diffuse light of a scene and write it as a glTF scene that other viewers show.
@@ -84,6 +86,7 @@ impl Command {
             Self::Resume(command) => command.run().await?,
             Self::Cancel(command) => command.run().await?,
             Self::Workers(command) => command.run().await?,
+            Self::Token(command) => command.run().await?,
             Self::Check(command) => command.run()?,
             Self::Bake(command) => command.run().await?,
             Self::Compare(command) => return command.run(),

@@ -38,6 +38,8 @@ pub(crate) struct Team {
     pub(crate) threads: usize,
     /// The farm.
     pub(crate) farm: SocketAddr,
+    /// What lets them in, where that is needed.
+    pub(crate) token: Option<String>,
     /// Where they keep scenes.
     pub(crate) cache: PathBuf,
     /// What becomes of what they write to standard error.
@@ -170,6 +172,10 @@ impl Watched {
             .stdout(Stdio::null())
             .stderr(Stdio::piped())
             .kill_on_drop(true);
+        match &self.team.token {
+            Some(token) => command.env("OVTIGRE_TOKEN", token),
+            None => command.env_remove("OVTIGRE_TOKEN"),
+        };
         // A Ctrl-C at the terminal is for the command, which then decides about its workers.
         #[cfg(unix)]
         command.process_group(0);

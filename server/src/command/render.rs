@@ -13,6 +13,7 @@ use super::{
     terminal,
 };
 use clap::Args;
+use ovtigre_proto::client::farm::Client;
 use std::{num::NonZeroUsize, path::PathBuf};
 
 /// Render a scene.
@@ -27,7 +28,7 @@ pub(crate) struct Render {
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1024))]
     workers: u32,
     /// Threads of each worker process [default: the cores shared out].
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = ovtigre_worker::flags::threads)]
     threads: Option<NonZeroUsize>,
     /// Folder in which the farm keeps its memory [default: a temporary one].
     #[arg(long, value_name = "DIR")]
@@ -35,6 +36,9 @@ pub(crate) struct Render {
     /// Render on this farm instead of starting one.
     #[arg(long, value_name = "URL", conflicts_with_all = ["workers", "threads", "data"])]
     server: Option<String>,
+    /// Token that this farm knows [default: the environment's OVTIGRE_TOKEN].
+    #[arg(long, value_name = "TOKEN", requires = "server")]
+    token: Option<String>,
     /// Show the log of farm and workers instead of a bar.
     #[arg(short, long)]
     verbose: bool,
@@ -48,7 +52,8 @@ impl Render {
         let submission = Submission::read(&self.scene, self.job).await?;
         let others = if self.verbose { Others::Log } else { Others::None };
         if let Some(server) = &self.server {
-            return carry_out(server, &submission, others, &interrupt, Workers::Theirs).await;
+            let client = farm_flags::client(server, self.token.as_deref())?;
+            return carry_out(&client, &submission, others, &interrupt, Workers::Theirs).await;
         }
         let plan = Plan {
             workers: self.workers,
@@ -57,8 +62,9 @@ impl Render {
             log: if self.verbose { WorkerLog::Shown } else { WorkerLog::Kept },
         };
         let farm = Embedded::start(plan).await?;
+        let client = farm_flags::client(&farm.address(), None)?;
         let workers = Workers::Ours(&farm.workers);
-        let outcome = carry_out(&farm.address(), &submission, others, &interrupt, workers).await;
+        let outcome = carry_out(&client, &submission, others, &interrupt, workers).await;
         tokio::select! {
             () = farm.stop() => {}
             () = interrupt.twice() => {}
@@ -68,24 +74,23 @@ impl Render {
 }
 
 async fn carry_out(
-    server: &str,
+    client: &Client,
     submission: &Submission,
     others: Others,
     interrupt: &Interrupt,
     workers: Workers<'_>,
 ) -> Outcome {
-    let client = farm_flags::client(server)?;
     let job = tokio::select! {
-        job = submission.submit(&client) => job?,
+        job = submission.submit(client) => job?,
         () = interrupt.once() => return Err(CommandError::stopped("stopped before the job was submitted")),
     };
     let mut progress = Progress::new(others);
     progress.show(&job);
-    let status = until_over(&client, &job.id, &mut progress, interrupt, &workers).await?;
+    let status = until_over(client, &job.id, &mut progress, interrupt, &workers).await?;
     drop(progress);
     workers.dismiss();
     tokio::select! {
-        collected = submission.collect(&client, &status) => collected,
+        collected = submission.collect(client, &status) => collected,
         () = interrupt.twice() => Err(CommandError::stopped("left before the picture was written")),
     }
 }

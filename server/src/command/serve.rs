@@ -5,14 +5,19 @@ use super::{
     exit::{CommandError, Outcome},
     interrupt::Interrupt,
     local_workers::{LocalWorkers, Team, WorkerLog},
-    terminal,
+    secret, terminal,
 };
 use clap::Args;
-use ovtigre::serve::{ServeConfig, start};
+use ovtigre::{
+    api::guard::{Guarding, WithoutTokens, hash},
+    farm::{rules::Rules, space::Room},
+    serve::{OwnPort, ServeConfig, free_bytes, start},
+    store::{Store as _, sql::Sql},
+};
 use std::{
     net::{IpAddr, SocketAddr},
     num::NonZeroUsize,
-    path::PathBuf,
+    path::{Path, PathBuf},
 };
 
 /// Run a farm.
@@ -24,12 +29,42 @@ pub(crate) struct Serve {
     /// Folder of the farm's memory: jobs, scenes, sums and pictures; made where it is not there.
     #[arg(long, value_name = "DIR", default_value = "ovtigre-data")]
     data: PathBuf,
+    /// Keep jobs in a PostgreSQL database instead, postgres://USER:PASSWORD@HOST:PORT/DATABASE; any number of farms over
+    /// the same database and blobs are one farm. [env: OVTIGRE_DATABASE]
+    #[arg(long, value_name = "URL")]
+    database: Option<String>,
+    /// Keep scenes, sums and pictures in a bucket of an S3-compatible service instead, s3://BUCKET/PREFIX; keys, region
+    /// and endpoint as for the service's own programs: AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY, AWS_REGION,
+    /// AWS_ENDPOINT_URL. [env: OVTIGRE_BLOBS]
+    #[arg(long, value_name = "URL")]
+    blobs: Option<String>,
     /// Worker processes to start on this machine.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(..=1024))]
     workers: u32,
     /// Threads of each of them [default: the cores shared out].
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = ovtigre_worker::flags::threads)]
     threads: Option<NonZeroUsize>,
+    /// Certificate chain of this farm, PEM: callers encrypt.
+    #[arg(long, value_name = "FILE", requires = "tls_key")]
+    tls_cert: Option<PathBuf>,
+    /// Its key, PEM.
+    #[arg(long, value_name = "FILE", requires = "tls_cert")]
+    tls_key: Option<PathBuf>,
+    /// Another name under which callers of this machine may call the farm; repeatable.
+    #[arg(long = "host", value_name = "NAME")]
+    hosts: Vec<String>,
+    /// Share of batches that another worker renders again, to compare.
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = share)]
+    audit: f64,
+    /// GiB on the disk that are kept free: below, nothing new is taken and no batch is handed out.
+    #[arg(long, value_name = "GIB", default_value_t = 1.0, value_parser = not_negative)]
+    reserve: f64,
+    /// Jobs under way of one token, at most.
+    #[arg(long, value_name = "N", default_value_t = 1000)]
+    jobs_per_token: usize,
+    /// Requests a second of one token, at most; of workers any number.
+    #[arg(long, value_name = "N", default_value_t = 100.0, value_parser = not_negative)]
+    requests_per_second: f64,
     /// Listen on other addresses than loopback although anyone who reaches them may do anything.
     #[arg(long)]
     insecure: bool,
@@ -38,25 +73,76 @@ pub(crate) struct Serve {
     log: String,
 }
 
+fn share(text: &str) -> Result<f64, String> {
+    let number = not_negative(text)?;
+    if number <= 1.0 { Ok(number) } else { Err("it is a share, 0 to 1".to_owned()) }
+}
+
+fn not_negative(text: &str) -> Result<f64, String> {
+    let number: f64 = text.parse().map_err(|_| "it is not a number".to_owned())?;
+    if number.is_finite() && number >= 0.0 { Ok(number) } else { Err("it is not 0 or more".to_owned()) }
+}
+
 impl Serve {
     /// Serves until it is interrupted.
     pub(crate) async fn run(self) -> Outcome {
-        if !self.listen.ip().is_loopback() && !self.insecure {
-            return Err(CommandError::wrong(format!(
-                "anyone who reaches {} could use this farm: listen on 127.0.0.1, or say --insecure",
-                self.listen
-            )));
-        }
         terminal::log(&self.log);
         let interrupt = Interrupt::listen();
         let cache = self.data.join("worker-scenes");
-        let config = ServeConfig { listen: self.listen, data: self.data };
+        // A password in the environment is not in the list of processes.
+        let named = |flag: Option<String>, name| flag.or_else(|| std::env::var(name).ok());
+        let database = named(self.database, "OVTIGRE_DATABASE");
+        let blobs = named(self.blobs, "OVTIGRE_BLOBS");
+        let own_token = secret::token()?;
+        let disk = self.data.clone();
+        let rules = Rules {
+            audit: self.audit,
+            reserve_bytes: (self.reserve * f64::from(1 << 30)) as u64,
+            jobs_per_token: self.jobs_per_token,
+            // Where blobs are elsewhere the disk is not what fills.
+            room: Room::new(move || free_bytes(&disk)),
+            ..Rules::default()
+        };
+        let listens_to_all = !self.listen.ip().is_loopback();
+        let guarding = Guarding {
+            without_tokens: match (listens_to_all, self.insecure) {
+                (true, false) => WithoutTokens::Refuse,
+                _ => WithoutTokens::LetIn,
+            },
+            hosts: if listens_to_all {
+                Vec::new()
+            } else {
+                [vec!["localhost".to_owned()], self.hosts].concat()
+            },
+            requests_per_second: self.requests_per_second,
+            own_work: Some(hash(&own_token)),
+        };
+        let tls = self.tls_cert.zip(self.tls_key);
+        let scheme = if tls.is_some() { "https" } else { "http" };
+        let own_port = if tls.is_some() && self.workers > 0 { OwnPort::Yes } else { OwnPort::No };
+        if listens_to_all && !self.insecure {
+            need_tokens(database.as_deref(), &self.data, self.listen).await?;
+            if tls.is_none() {
+                tracing::warn!("tokens and pictures are sent in the clear: give --tls-cert and --tls-key");
+            }
+        }
+        let config = ServeConfig {
+            listen: self.listen,
+            data: self.data,
+            database,
+            blobs,
+            rules,
+            guarding,
+            tls,
+            own_port,
+        };
         let serving = start(config).await.map_err(|e| CommandError::wrong(e.to_string()))?;
-        terminal::result(&format!("http://{}", serving.address));
+        terminal::result(&format!("{scheme}://{}", serving.address));
         let workers = LocalWorkers::start(&Team {
             count: self.workers,
             threads: self.threads.map_or_else(|| share_of_cores(self.workers), NonZeroUsize::get),
-            farm: reachable(serving.address),
+            farm: reachable(serving.own.unwrap_or(serving.address)),
+            token: Some(own_token),
             cache,
             log: WorkerLog::Shown,
         })?;
@@ -76,6 +162,27 @@ impl Serve {
             () = interrupt.twice() => Err(CommandError::stopped("left before everything was put away")),
         }
     }
+}
+
+/// An error where a farm that others can reach has no token that would let them in.
+async fn need_tokens(database: Option<&str>, data: &Path, listen: SocketAddr) -> Outcome {
+    let store = match database {
+        Some(url) => Sql::server(url).await,
+        None => {
+            std::fs::create_dir_all(data).ok();
+            Sql::beside(&data.join("farm.sqlite")).await
+        }
+    };
+    let store = store.map_err(|e| CommandError::wrong(e.to_string()))?;
+    let tokens = store.tokens().await.map_err(|e| CommandError::wrong(e.to_string()));
+    store.close().await;
+    if tokens?.is_empty() {
+        return Err(CommandError::wrong(format!(
+            "anyone who reaches {listen} could use this farm: make a token first (ovtigre token create --role admin), \
+             listen on 127.0.0.1, or say --insecure"
+        )));
+    }
+    Ok(())
 }
 
 /// Where this machine finds a farm that listens everywhere.

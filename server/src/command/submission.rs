@@ -10,6 +10,7 @@ use ovtigre_proto::{
     client::{error::ClientError, farm::Client, file::Upload},
     job::JobRequest,
     pair::{EnvironmentRequest, radiance},
+    scene::SceneContent,
     status::{JobState, JobStatus},
 };
 use std::{
@@ -31,7 +32,7 @@ pub(crate) struct Submission {
 #[derive(Debug)]
 enum Environment {
     Uniform([f32; 3]),
-    Image(Upload),
+    Image(PathBuf, Upload),
 }
 
 impl Submission {
@@ -56,8 +57,14 @@ impl Submission {
         let environment = match &self.environment {
             None => None,
             Some(Environment::Uniform(radiance)) => Some(EnvironmentRequest::Uniform(*radiance)),
-            Some(Environment::Image(image)) => {
-                client.upload(image).await?;
+            Some(Environment::Image(path, image)) => {
+                let report = client.upload(image).await.map_err(|e| no_image(path, e))?;
+                if let SceneContent::Scene(_) = report.content {
+                    return Err(CommandError::wrong(format!(
+                        "environment {}: it is a scene; give an image (.exr or .hdr)",
+                        path.display()
+                    )));
+                }
                 Some(EnvironmentRequest::Image(image.id().clone()))
             }
         };
@@ -115,7 +122,12 @@ async fn environment(text: &str) -> Outcome<Environment> {
         let wrong = format!("environment '{text}' is neither a file nor three numbers R,G,B from 0 on");
         return Err(CommandError::wrong(wrong));
     }
-    Ok(Environment::Image(Upload::file(path).await?))
+    if !path.is_file() {
+        let reason = if path.exists() { "it is not a plain file" } else { "there is no such file" };
+        return Err(CommandError::wrong(format!("environment {}: {reason}", path.display())));
+    }
+    let upload = Upload::file(path.clone()).await?;
+    Ok(Environment::Image(path, upload))
 }
 
 /// Tells this submission from any other, and not from its own repetition.
@@ -124,6 +136,20 @@ fn key(request: &JobRequest) -> String {
     let text = serde_json::to_string(request).expect("a request is plain data");
     let hash = blake3::hash(format!("{}-{now}-{text}", std::process::id()).as_bytes());
     hash.to_hex().as_str()[..32].to_owned()
+}
+
+/// What the farm says of an environment that it cannot read.
+fn no_image(path: &Path, error: ClientError) -> CommandError {
+    let ClientError::Problem(problem) = &error else { return error.into() };
+    let detail = problem.errors.first().map_or(&problem.detail, |found| &found.detail);
+    if problem.status < 500 {
+        let path = path.display();
+        CommandError::wrong(format!(
+            "environment {path}: not an image to light with (.exr or .hdr): {detail}"
+        ))
+    } else {
+        error.into()
+    }
 }
 
 /// What the farm says of a scene that it cannot read, in the name that the scene has here.

@@ -27,7 +27,7 @@ impl Work {
     pub(crate) async fn run(self) -> Outcome {
         terminal::log(&self.log);
         let bell = Bell::default();
-        tokio::spawn(bell.clone().ring_on_signals());
+        tokio::spawn(bell.clone().ring_on_signals(self.work.first_signal()));
         if self.work.until_stdin_closes {
             tokio::spawn(bell.clone().ring_when_stdin_closes());
         }

@@ -37,6 +37,7 @@ fn row(worker: &WorkerStatus) -> [String; 9] {
         WorkerState::Draining => "draining",
         WorkerState::Lost => "lost",
         WorkerState::Gone => "gone",
+        WorkerState::Aside => "aside",
     };
     [
         worker.id.to_string(),

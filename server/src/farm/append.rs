@@ -14,7 +14,7 @@ use crate::{
 };
 use bytes::Bytes;
 use ovtigre_core::film::{append::Prefix, exr, schedule::Schedule, sum::Sum};
-use ovtigre_proto::id::JobId;
+use ovtigre_proto::id::{BlobId, JobId};
 use std::{
     collections::{BTreeMap, VecDeque},
     sync::Arc,
@@ -39,7 +39,7 @@ pub struct Merge {
     pub used: Instant,
     points: Vec<u32>,
     waiting: BTreeMap<BatchKey, Arrival>,
-    snapshots: BTreeMap<Lane, u32>,
+    pub(super) snapshots: BTreeMap<Lane, u32>,
 }
 
 /// What the lanes can do now.
@@ -109,6 +109,12 @@ impl Merge {
             let sum = arrival.sum.or(before.and_then(|b| b.sum));
             self.waiting.insert(batch, Arrival { row: arrival.row, sum });
         }
+    }
+
+    /// Takes up what was brought to and looked at by whoever appends.
+    pub(super) fn follow(&mut self, commits: Vec<CommitRow>, checkpoints: u32) {
+        self.checkpoints = self.checkpoints.max(checkpoints);
+        commits.into_iter().for_each(|row| self.add(Arrival { row, sum: None }));
     }
 
     /// Keeps at most `bytes` of decoded sums among what waits: the others are read from their blobs
@@ -206,7 +212,11 @@ impl Merge {
     fn overdue(&self, partials: u32) -> Vec<(Lane, u32)> {
         let since = |lane: &Lane| self.snapshots.get(lane).copied().unwrap_or(0);
         lanes(&self.schedule)
-            .filter(|lane| self.prefix(*lane).blocks() >= since(lane) + partials)
+            .filter(|lane| {
+                let blocks = self.prefix(*lane).blocks();
+                // Past these a longer schedule has other blocks: what is kept is what both have.
+                blocks >= since(lane) + partials && blocks <= self.schedule.whole_blocks() as u32
+            })
             .map(|lane| (lane, since(&lane)))
             .collect()
     }
@@ -221,6 +231,10 @@ impl Farm {
         let mut held = Arc::clone(&live.merge).lock_owned().await;
         if held.is_none() {
             self.make_room(live);
+        }
+        if self.is_shared() && live.mandate().is_none() {
+            held = self.catch_up(live, held).await?;
+        } else if held.is_none() {
             *held = Some(self.load(live).await?);
         }
         if let Some(merge) = held.as_mut() {
@@ -229,20 +243,51 @@ impl Farm {
         Ok(held)
     }
 
-    async fn load(&self, live: &Live) -> Result<Merge> {
-        let ledger = self.store.ledger(&live.id).await?;
+    pub(super) async fn load(&self, live: &Live) -> Result<Merge> {
+        let mut ledger = self.store.ledger(&live.id).await?;
         let mut kept = Vec::with_capacity(ledger.snapshots.len());
+        let mut lost = Vec::new();
         for (lane, blocks) in &ledger.snapshots {
-            let bytes = self.blobs.get(&BlobName::Prefix(live.id.clone(), *lane, *blocks)).await?;
-            let prefix = blocking(move || Prefix::from_bytes(&bytes)).await?;
-            kept.push(prefix.map_err(|e| FarmError::Damaged(e.to_string()))?);
+            match self.prefix(live, *lane, *blocks).await? {
+                Some(prefix) => kept.push(prefix),
+                None => lost.push((*lane, *blocks)),
+            }
+        }
+        if !lost.is_empty() {
+            self.may_mend(live)?;
+            let batches = lost.iter().flat_map(|(lane, blocks)| (0..*blocks).map(|block| lane.at(block)));
+            self.again(live, batches.collect(), lost.iter().map(|(lane, _)| *lane).collect()).await?;
+            ledger = self.store.ledger(&live.id).await?;
         }
         let schedule = Arc::clone(&live.schedule);
         let mut merge =
             Merge::new(schedule, live.spec.settings.planes(), kept, ledger.commits, ledger.checkpoints);
+        live.set_brought(ledger.brought);
         live.arrivals().into_iter().for_each(|arrival| merge.add(arrival));
         publish(live, &merge);
         Ok(merge)
+    }
+
+    /// An error where another server appends to the job's sums: what is missing here is only replaced there.
+    fn may_mend(&self, live: &Live) -> Result<()> {
+        if self.is_shared() && live.mandate().is_none() {
+            return Err(FarmError::Damaged("a part of its sums is not there".to_owned()));
+        }
+        Ok(())
+    }
+
+    /// What is kept of a lane; `None` where that is lost or damaged.
+    pub(super) async fn prefix(&self, live: &Live, lane: Lane, blocks: u32) -> Result<Option<Prefix>> {
+        let bytes = match self.blobs.get(&BlobName::Prefix(live.id.clone(), lane, blocks)).await {
+            Ok(bytes) => bytes,
+            Err(BlobError::Missing(_)) => return Ok(None),
+            Err(error) => return Err(error.into()),
+        };
+        let region = live.schedule.regions().get(lane.region as usize).copied();
+        let prefix = blocking(move || Prefix::from_bytes(&bytes)).await?;
+        Ok(prefix.ok().filter(|p| {
+            p.blocks() == blocks && p.replicate() == lane.replicate && Some(p.region()) == region
+        }))
     }
 
     /// Lets go of sums that were not needed lately, until those of `live` fit beside the rest.
@@ -268,6 +313,11 @@ impl Farm {
 
     /// Appends what can be, looks at checkpoints; true when the job is over.
     pub async fn advance(&self, live: &Arc<Live>) -> Result<bool> {
+        if !self.holds(live).await? {
+            // Whoever appends reads from the store what was brought.
+            live.arrivals();
+            return Ok(false);
+        }
         let mut held = self.sums(live).await?;
         loop {
             if self.stopping.is_cancelled() {
@@ -300,39 +350,59 @@ impl Farm {
         }
     }
 
+    /// Appends what can be, and writes nothing down.
+    pub(super) async fn append_all(&self, live: &Live, mut held: Held) -> Result<Held> {
+        while let Next::Append(ready) = held.as_mut().expect("loaded by the caller").advance() {
+            held = self.append(live, held, ready).await?;
+        }
+        Ok(held)
+    }
+
     async fn append(&self, live: &Live, mut held: Held, ready: Vec<Arrival>) -> Result<Held> {
         let mut sums = Vec::with_capacity(ready.len());
         let mut bytes = 0;
         for Arrival { row, sum } in ready {
             let source = match sum {
                 Some(sum) => Source::Decoded(sum),
-                None => Source::Partial(self.partial(&live.id, &row).await?),
+                None => self.partial(&live.id, &row).await?,
             };
             bytes += source.bytes();
             sums.push((row, source));
         }
         let appended = sums.len() as u64;
-        let held = blocking(move || -> Result<Held> {
+        let (held, lost) = blocking(move || -> Result<(Held, Vec<BatchKey>)> {
             let merge = held.as_mut().expect("loaded by the caller");
+            let mut lost: Vec<BatchKey> = Vec::new();
             for (row, source) in sums {
+                if lost.iter().any(|batch| batch.lane() == row.batch.lane()) {
+                    merge.add(Arrival { row, sum: None });
+                    continue;
+                }
                 let region = merge.schedule.regions()[row.batch.region as usize];
-                let sum = source.decode(region.pixels())?;
-                merge.append(&row, &sum)?;
+                match source.decode(region.pixels(), &row) {
+                    Some(sum) => merge.append(&row, &sum)?,
+                    None => lost.push(row.batch),
+                }
             }
-            Ok(held)
+            Ok((held, lost))
         })
         .await??;
+        if !lost.is_empty() {
+            self.may_mend(live)?;
+            self.again(live, lost, Vec::new()).await?;
+        }
         self.counters.appended(appended, bytes);
         publish(live, held.as_ref().expect("loaded by the caller"));
         Ok(held)
     }
 
-    async fn partial(&self, job: &JobId, row: &CommitRow) -> Result<Bytes> {
+    async fn partial(&self, job: &JobId, row: &CommitRow) -> Result<Source> {
         let name = BlobName::Partial(job.clone(), row.batch, row.hash.clone());
-        self.blobs.get(&name).await.map_err(|error| match error {
-            BlobError::Missing(_) => FarmError::Damaged(format!("the sum of {} is lost", row.batch)),
-            other => other.into(),
-        })
+        match self.blobs.get(&name).await {
+            Ok(bytes) => Ok(Source::Partial(bytes)),
+            Err(BlobError::Missing(_)) => Ok(Source::Lost),
+            Err(error) => Err(error.into()),
+        }
     }
 
     /// Keeps lanes with many partials as one blob each, then removes those partials.
@@ -347,7 +417,7 @@ impl Farm {
             .await?;
             held = back;
             self.blobs.put(&BlobName::Prefix(live.id.clone(), lane, blocks), bytes.into()).await?;
-            self.store.set_snapshot(&live.id, lane, blocks).await?;
+            self.store.set_snapshot(&live.id, Self::mandate(live)?, lane, blocks).await?;
             held.as_mut().expect("loaded by the caller").snapshots.insert(lane, blocks);
             self.forget_partials(live, lane, since, blocks).await?;
         }
@@ -369,6 +439,7 @@ impl Farm {
 enum Source {
     Decoded(Sum),
     Partial(Bytes),
+    Lost,
 }
 
 impl Source {
@@ -376,15 +447,18 @@ impl Source {
         match self {
             Self::Decoded(sum) => sum_bytes(sum),
             Self::Partial(bytes) => bytes.len() as u64,
+            Self::Lost => 0,
         }
     }
 
-    fn decode(self, pixels: usize) -> Result<Sum> {
+    /// The sum that was committed; `None` where what is kept is not that, or not whole.
+    fn decode(self, pixels: usize, row: &CommitRow) -> Option<Sum> {
         match self {
-            Self::Decoded(sum) => Ok(sum),
+            Self::Decoded(sum) => Some(sum),
+            Self::Lost => None,
             Self::Partial(bytes) => {
-                let read = exr::read_partial(&bytes, pixels);
-                read.map(|(sum, _)| sum).map_err(|e| FarmError::Damaged(e.to_string()))
+                let (sum, _) = exr::read_partial(&bytes, pixels).ok()?;
+                (BlobId::of(sum.hash()) == row.hash).then_some(sum)
             }
         }
     }

@@ -69,9 +69,10 @@ impl Farm {
             relative_error: found.map(|e| e.relative),
             relative_error_upper: found.and_then(|e| e.relative_upper),
         };
+        let mandate = Self::mandate(live)?;
         merge.checkpoints += 1;
         let checkpoint = NewCheckpoint { look: merge.checkpoints, row, layers: layers.clone(), progress };
-        if let Err(error) = self.store.add_checkpoint(&live.id, checkpoint).await {
+        if let Err(error) = self.store.add_checkpoint(&live.id, mandate, checkpoint).await {
             merge.checkpoints -= 1;
             return Err(error.into());
         }

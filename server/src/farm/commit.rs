@@ -3,13 +3,15 @@
 use super::{
     Farm,
     append::blocking,
+    audit::Audit,
     counters::Fate,
     error::{FarmError, Result},
     ids::batch_of,
     live::{Arrival, Live},
+    rules::PARTIAL_BYTES_MAX,
 };
 use crate::{
-    blobs::BlobName,
+    blobs::{BlobError, BlobName},
     store::row::{BatchKey, CommitOutcome, CommitRow, NewCommit},
 };
 use bytes::Bytes;
@@ -19,12 +21,21 @@ use ovtigre_core::{
 };
 use ovtigre_proto::{
     id::{BlobId, JobId, LeaseId, WorkerId},
-    lease::Commit,
+    lease::{Commit, FailureKind, LeaseFailure},
 };
-use std::time::Duration;
+use std::{sync::Arc, time::Duration};
 
 /// Longest time that is believed of one batch.
 const TIME_MAX: Duration = Duration::from_hours(30 * 24);
+
+/// How a sum came.
+#[derive(Clone, Copy)]
+enum Way {
+    /// With the request.
+    Here,
+    /// It is among the blobs.
+    Handed,
+}
 
 /// What a partial EXR says.
 struct Decoded {
@@ -36,20 +47,60 @@ struct Decoded {
 impl Farm {
     /// The partial EXR of a lease's batch, on which its worker spent `time`. The first sum of a
     /// batch counts, even after its lease has ended; a further one is compared with it.
-    pub async fn commit(&self, lease: &LeaseId, partial: Bytes, time: Duration) -> Result<Commit> {
+    pub async fn commit(self: &Arc<Self>, lease: &LeaseId, partial: Bytes, time: Duration) -> Result<Commit> {
+        self.take_sum(lease, partial, time, Way::Here).await
+    }
+
+    /// The same of a partial EXR that its worker has put where the lease said. An error where it is not
+    /// there: it may have been taken before.
+    pub async fn commit_handed(self: &Arc<Self>, lease: &LeaseId, time: Duration) -> Result<Commit> {
+        let name = BlobName::Handed(lease.clone());
+        let bytes = self.blobs.size(&name).await.map_err(|error| match error {
+            BlobError::Missing(_) => FarmError::not_found("sum of lease", lease),
+            other => other.into(),
+        })?;
+        let limit = 2 * PARTIAL_BYTES_MAX as u64;
+        let taken = if bytes > limit {
+            Err(FarmError::TooLarge { limit })
+        } else {
+            let partial = self.blobs.get(&name).await?;
+            self.take_sum(lease, partial, time, Way::Handed).await
+        };
+        self.blobs.delete(&name).await?;
+        taken
+    }
+
+    async fn take_sum(
+        self: &Arc<Self>,
+        lease: &LeaseId,
+        partial: Bytes,
+        time: Duration,
+        way: Way,
+    ) -> Result<Commit> {
+        self.need_room_for_sums()?;
         let (job, key) = batch_of(lease).ok_or_else(|| FarmError::not_found("lease", lease))?;
         let row = self.store.job(&job).await?.ok_or_else(|| FarmError::not_found("lease", lease))?;
-        let Some(live) = self.live(&job).filter(|_| !row.state.is_over()) else {
+        let Some(live) = self.meet(&job).await?.filter(|_| !row.state.is_over()) else {
             self.counters.count(Fate::NotNeeded);
             return Ok(Commit::NotNeeded);
         };
         let batch = live.batch(key).ok_or_else(|| FarmError::not_found("lease", lease))?;
-        let Decoded { sum, hash, solution } = self.decode(&live, batch, partial.clone()).await?;
+        let Decoded { sum, hash, solution } = match self.decode(&live, batch, partial.clone()).await {
+            Ok(decoded) => decoded,
+            Err(error) => return Err(self.refuse(lease, error).await),
+        };
         if let Some(json) = solution.filter(|_| live.spec.settings.method == Method::Radiosity) {
             self.keep_solution(&job, &json).await?;
         }
+        let audit = self.book().end_audit(lease);
+        if let Some((row, audit)) = audit {
+            return self.compare(&live, key, &row.worker, audit, &hash).await;
+        }
         let name = BlobName::Partial(job.clone(), key, hash.clone());
-        self.blobs.put(&name, partial).await?;
+        match way {
+            Way::Here => self.blobs.put_once(&name, partial).await?,
+            Way::Handed => self.blobs.rename(&BlobName::Handed(lease.clone()), &name).await?,
+        }
         let worker = self.book().lease(lease).map(|held| held.row.worker.clone());
         let micros = time.min(TIME_MAX).as_micros() as u64;
         let row = CommitRow { batch: key, hash, worker_micros: micros };
@@ -62,9 +113,17 @@ impl Farm {
         match self.store.commit(new).await? {
             CommitOutcome::First => {
                 self.counters.count(Fate::Accepted);
-                self.book().brought(&job, key);
+                let failed = self.book().brought(&job, key);
                 if let Some(worker) = &worker {
                     self.crew().clear(worker);
+                    // What another could render was not the job's fault.
+                    for at_fault in failed.iter().filter(|other| *other != worker) {
+                        self.blame(at_fault, &job, "another worker could render what it could not").await?;
+                    }
+                    if self.is_audited(lease) {
+                        let audit = Audit { first: worker.clone(), second: None };
+                        self.book().audits.ask(job.clone(), key, audit);
+                    }
                 }
                 self.arrive(&live, row, sum);
                 Ok(Commit::Accepted)
@@ -88,6 +147,19 @@ impl Farm {
                 Err(FarmError::not_found("lease", lease))
             }
         }
+    }
+
+    /// A sum that cannot be used is its worker's fault, and the batch goes to another.
+    async fn refuse(&self, lease: &LeaseId, error: FarmError) -> FarmError {
+        if let FarmError::Sum(reason) = &error {
+            let failure =
+                LeaseFailure { reason: format!("its sum was refused: {reason}"), kind: FailureKind::Worker };
+            match self.give_back(lease, failure).await {
+                Ok(()) | Err(FarmError::NotFound { .. }) => {}
+                Err(error) => tracing::error!(%lease, %error, "a refused batch was not taken back"),
+            }
+        }
+        error
     }
 
     async fn decode(&self, live: &Live, batch: Batch, partial: Bytes) -> Result<Decoded> {

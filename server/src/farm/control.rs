@@ -4,6 +4,7 @@ use super::{
     Farm,
     book::HandOut,
     error::{FarmError, Result, fault},
+    extend::changes_spec,
 };
 use crate::store::row::{JobChange, JobRow};
 use ovtigre_proto::{
@@ -11,17 +12,34 @@ use ovtigre_proto::{
     job::JobPatch,
     status::{JobState, JobStatus},
 };
+use std::sync::Arc;
 
 impl Farm {
-    /// Changes a job, if it still has `version` where one is given.
-    pub async fn patch(&self, id: &JobId, patch: &JobPatch, version: Option<u64>) -> Result<JobStatus> {
+    /// Changes a job, if it still has one of `versions` where some are given.
+    pub async fn patch(
+        self: &Arc<Self>,
+        id: &JobId,
+        patch: &JobPatch,
+        versions: Option<Vec<u64>>,
+    ) -> Result<JobStatus> {
         if let Some(state) = patch.state.filter(|s| !matches!(s, JobState::Paused | JobState::Running)) {
             let detail = format!("'{}' cannot be asked for: 'paused' or 'running' can", state.name());
             return Err(FarmError::Patch(vec![fault("/state", detail)]));
         }
+        if changes_spec(patch) {
+            let extended = self.extend(id, patch, versions.as_deref()).await?;
+            let rest = JobPatch { priority: patch.priority, state: patch.state, ..JobPatch::default() };
+            // A job that goes on is not paused unless that is asked for.
+            let over = extended.state.is_over();
+            return if over || rest == JobPatch::default() {
+                Ok(extended)
+            } else {
+                Box::pin(self.patch(id, &rest, None)).await
+            };
+        }
         loop {
             let row = self.job_row(id).await?;
-            if version.is_some_and(|version| version != row.version) {
+            if versions.as_ref().is_some_and(|versions| !versions.contains(&row.version)) {
                 return Err(FarmError::Version { current: row.version });
             }
             if row.state.is_over() {
@@ -43,7 +61,7 @@ impl Farm {
     }
 
     /// Brings the book up to what the store says.
-    fn follow(&self, row: &JobRow) {
+    pub(super) fn follow(&self, row: &JobRow) {
         let mut book = self.book();
         if row.state.is_over() {
             book.remove(&row.id);

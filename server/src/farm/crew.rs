@@ -1,8 +1,13 @@
 //! Workers that were heard of, in memory: the store is told of beats only now and then.
 
-use ovtigre_proto::{id::WorkerId, status::WorkerState};
+use ovtigre_proto::{
+    id::{JobId, WorkerId},
+    lease::WorkerJoin,
+    status::WorkerState,
+};
 use std::{
-    collections::HashMap,
+    collections::{BTreeSet, HashMap},
+    sync::Arc,
     time::{Duration, Instant},
 };
 
@@ -10,8 +15,10 @@ use std::{
 const STRIKES_MAX: u32 = 6;
 
 /// A worker.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Member {
+    /// What it says of itself.
+    pub join: Arc<WorkerJoin>,
     /// How it stands.
     pub state: WorkerState,
     /// Batches that it holds or would take.
@@ -24,12 +31,15 @@ pub struct Member {
     pub strikes: u32,
     /// It gets no batch before.
     pub rests_until: Instant,
+    /// Jobs at which it failed since it brought a batch, by its own fault.
+    pub failed_at: BTreeSet<JobId>,
 }
 
 impl Member {
     /// One that is heard of for the first time.
-    pub fn new(state: WorkerState, now: Instant) -> Self {
-        Self { state, capacity: 1, noted: now, seen: now, strikes: 0, rests_until: now }
+    pub fn new(join: Arc<WorkerJoin>, state: WorkerState, now: Instant) -> Self {
+        let failed_at = BTreeSet::new();
+        Self { join, state, capacity: 1, noted: now, seen: now, strikes: 0, rests_until: now, failed_at }
     }
 }
 
@@ -42,7 +52,7 @@ pub struct Crew {
 impl Crew {
     /// A worker, if it was heard of since the farm was started.
     pub fn get(&self, id: &WorkerId) -> Option<Member> {
-        self.members.get(id).copied()
+        self.members.get(id).cloned()
     }
 
     /// A worker is heard of.
@@ -66,11 +76,20 @@ impl Crew {
         }
     }
 
+    /// A worker failed at a job by its own fault; at how many it did so since it brought a batch.
+    pub fn blame(&mut self, id: &WorkerId, job: &JobId) -> usize {
+        self.members.get_mut(id).map_or(0, |member| {
+            member.failed_at.insert(job.clone());
+            member.failed_at.len()
+        })
+    }
+
     /// A worker brought a batch.
     pub fn clear(&mut self, id: &WorkerId) {
         if let Some(member) = self.members.get_mut(id) {
             member.strikes = 0;
             member.rests_until = Instant::now();
+            member.failed_at.clear();
         }
     }
 

@@ -1,6 +1,9 @@
 //! Why the farm did not do what was asked.
 
-use crate::{blobs::BlobError, store::error::StoreError};
+use crate::{
+    blobs::BlobError,
+    store::{error::StoreError, row::JobRow},
+};
 use ovtigre_proto::{
     id::{BlobId, JobId},
     problem::Fault,
@@ -21,6 +24,9 @@ pub enum FarmError {
     /// A job that cannot be taken as it is.
     #[error("the job cannot be taken: {}", said(.0))]
     Request(Vec<Fault>),
+    /// A worker that cannot join.
+    #[error("the worker cannot join: {}", said(.0))]
+    Worker(Vec<Fault>),
     /// A change that cannot be made.
     #[error("the change cannot be made: {}", said(.0))]
     Patch(Vec<Fault>),
@@ -64,6 +70,9 @@ pub enum FarmError {
     /// No batch came yet.
     #[error("the job '{0}' has no picture yet: ask again later")]
     NoPicture(JobId),
+    /// It ended before there was a picture.
+    #[error("the job '{0}' ended without a picture")]
+    NeverPicture(JobId),
     /// A layer that the picture has not.
     #[error("the picture has no layer '{0}'")]
     NoLayer(String),
@@ -76,12 +85,26 @@ pub enum FarmError {
     /// What is kept of a job cannot be used.
     #[error("what is kept of the job cannot be used: {0}")]
     Damaged(String),
+    /// Too many jobs of one token.
+    #[error("there are {most} jobs under way of this token: wait for some to end, or cancel some")]
+    TooManyJobs {
+        /// As many as there may be.
+        most: usize,
+    },
+    /// The disk is nearly full.
+    #[error("the farm's disk is nearly full: make room on it, or remove jobs with ?purge=true")]
+    Full,
     /// The farm is stopping.
     #[error("the farm is stopping: ask again later")]
     Stopping,
 }
 
 impl FarmError {
+    /// A job has no picture: not yet, or never.
+    pub fn no_picture(row: &JobRow) -> Self {
+        if row.settled { Self::NeverPicture(row.id.clone()) } else { Self::NoPicture(row.id.clone()) }
+    }
+
     /// Nothing of that name.
     pub fn not_found(what: &'static str, id: &(impl ToString + ?Sized)) -> Self {
         Self::NotFound { what, id: id.to_string() }

@@ -1,65 +1,46 @@
-//! Workers join, beat, get batches and give them back.
+//! Workers beat, get batches and give them back.
 
 use super::{
     Farm,
-    book::Offer,
+    book::{Asker, Offer},
     counters::Fate,
     crew::Member,
-    error::{FarmError, Result, fault},
+    error::{FarmError, Result},
+    ids::batch_of,
 };
-use crate::store::row::{Claim, LeaseRow, Released};
+use crate::{
+    blobs::BlobName,
+    store::row::{Claim, LeaseRow, Released},
+};
 use ovtigre_proto::{
-    id::{LeaseId, WorkerId},
-    lease::{Exchange, ExchangeReply, FailureKind, Lease, LeaseFailure, WorkerJoin, WorkerJoined},
+    id::{JobId, LeaseId, WorkerId},
+    lease::{Exchange, ExchangeReply, FailureKind, Lease, LeaseFailure, WorkerJoin},
     status::WorkerState,
 };
 use std::{
+    collections::BTreeSet,
     pin::pin,
+    sync::Arc,
     time::{Duration, Instant},
 };
 
-/// Longest text that a worker says of itself.
-const TEXT_MAX: usize = 200;
-/// Tags of a worker, at most.
-const TAGS_MAX: usize = 64;
+/// Where a sum may be put directly, that is so for so long after its lease was given.
+const UPLOAD: Duration = Duration::from_hours(12);
 
 impl Farm {
-    /// A worker joins.
-    pub async fn join(&self, join: WorkerJoin) -> Result<WorkerJoined> {
-        let texts =
-            [("/name", &join.name), ("/build", &join.build), ("/instruction_set", &join.instruction_set)];
-        for (pointer, text) in texts {
-            if text.len() > TEXT_MAX {
-                return Err(FarmError::Request(vec![fault(
-                    pointer,
-                    format!("longer than {TEXT_MAX} bytes"),
-                )]));
-            }
-        }
-        if join.tags.len() > TAGS_MAX || join.tags.iter().any(|tag| tag.len() > TEXT_MAX) {
-            let detail = format!("more than {TAGS_MAX} tags, or one longer than {TEXT_MAX} bytes");
-            return Err(FarmError::Request(vec![fault("/tags", detail)]));
-        }
-        let id = self.ids.worker();
-        let (name, threads) = (join.name.clone(), join.threads);
-        self.store.add_worker(&id, join).await?;
-        self.crew().set(&id, Member::new(WorkerState::Active, Instant::now()));
-        tracing::info!(worker = %id, name, threads, "worker joined");
-        Ok(WorkerJoined { id, interval_seconds: self.interval() })
-    }
-
     /// A worker's beat: renews what it holds, tells what to drop, hands out what it wants. A worker that
     /// holds nothing is answered when there is something for it, or else at the time of its next beat.
     pub async fn exchange(&self, worker: &WorkerId, said: Exchange) -> Result<ExchangeReply> {
-        let state = self.hear(worker, &said).await?;
+        let (state, join) = self.hear(worker, &said).await?;
         let drop = self.renew(worker, &said).await?;
         let more = self.book().more();
         let mut more = pin!(more.notified());
         more.as_mut().enable();
         let mut interval = self.interval();
         let mut leases = Vec::new();
-        if state == WorkerState::Active && !said.leaving && !self.crew().rests(worker) {
-            leases = self.hand_out(worker, &said).await?;
+        let serves = state == WorkerState::Active && !said.leaving && !self.crew().rests(worker);
+        if serves && !self.is_full() {
+            leases = self.hand_out(worker, &join, &said).await?;
             let idle = said.wants > 0 && said.holding.is_empty() && drop.is_empty();
             if leases.is_empty() && idle {
                 tokio::select! {
@@ -67,51 +48,60 @@ impl Farm {
                     () = self.stopping.cancelled() => {}
                     () = tokio::time::sleep(Duration::from_secs_f64(interval)) => interval = 0.0,
                 }
-                leases = self.hand_out(worker, &said).await?;
+                leases = self.hand_out(worker, &join, &said).await?;
             }
         }
-        let drain = state != WorkerState::Active;
+        // One that is put aside stays where people see it, and does not come back under a new name.
+        let drain = !matches!(state, WorkerState::Active | WorkerState::Aside);
         Ok(ExchangeReply { leases, drop, interval_seconds: interval, drain })
     }
 
     /// Seconds between beats: short while there are few workers.
-    fn interval(&self) -> f64 {
+    pub(super) fn interval(&self) -> f64 {
         let crowd = f64::from(self.crew().active(self.rules.silence)) / self.rules.beats_per_second;
         // A lease is renewed several times before it ends.
         crowd.max(self.rules.beat.as_secs_f64()).min(self.rules.lease.as_secs_f64() / 4.0)
     }
 
-    async fn hear(&self, id: &WorkerId, said: &Exchange) -> Result<WorkerState> {
+    async fn hear(&self, id: &WorkerId, said: &Exchange) -> Result<(WorkerState, Arc<WorkerJoin>)> {
         let known = self.crew().get(id);
-        let before = match known {
-            Some(member) => member.state,
-            None => self.worker_row(id).await?.state,
+        let (before, join) = match &known {
+            Some(member) => (member.state, Arc::clone(&member.join)),
+            None => {
+                let row = self.worker_row(id).await?;
+                (row.state, Arc::new(row.join))
+            }
         };
         let state = match before {
             WorkerState::Gone => return Err(FarmError::not_found("worker", id)),
             _ if said.leaving && said.holding.is_empty() => WorkerState::Gone,
             WorkerState::Draining => WorkerState::Draining,
+            WorkerState::Aside => WorkerState::Aside,
             WorkerState::Active | WorkerState::Lost => WorkerState::Active,
         };
         let now = Instant::now();
-        let noted = known.filter(|m| m.state == state && m.noted.elapsed() < self.rules.note_beat);
-        if noted.is_none() && !self.store.see_worker(id, state).await? {
-            return Err(FarmError::not_found("worker", id));
-        }
+        let noted = known.as_ref().filter(|m| m.state == state && m.noted.elapsed() < self.rules.note_beat);
+        let state = match noted {
+            Some(_) => state,
+            None => match self.store.see_worker(id, state).await? {
+                None => return Err(FarmError::not_found("worker", id)),
+                Some(told) => told,
+            },
+        };
         let capacity = said.wants.min(self.rules.wants_max) + said.holding.len() as u32;
         let member = Member {
             state,
             capacity,
             noted: noted.map_or(now, |m| m.noted),
             seen: now,
-            ..known.unwrap_or_else(|| Member::new(state, now))
+            ..known.clone().unwrap_or_else(|| Member::new(Arc::clone(&join), state, now))
         };
         if state == WorkerState::Gone {
             self.crew().remove(id);
         } else {
             self.crew().set(id, member);
         }
-        Ok(state)
+        Ok((state, join))
     }
 
     /// Renews leases that are due; returns those that the worker no longer has.
@@ -122,10 +112,13 @@ impl Farm {
             let mut book = self.book();
             for progress in &said.holding {
                 match book.lease(&progress.lease).filter(|held| held.row.worker == *worker) {
+                    Some(held) if held.audit.is_some() => held.renewed = Instant::now(),
                     Some(held) if held.renewed.elapsed() > self.rules.lease / 4 => {
                         due.push(progress.lease.clone());
                     }
                     Some(_) => {}
+                    // Another server may have handed it out.
+                    None if self.is_shared() => due.push(progress.lease.clone()),
                     None => lost.push(progress.lease.clone()),
                 }
             }
@@ -136,6 +129,11 @@ impl Farm {
             for id in due {
                 match book.lease(&id) {
                     Some(held) if renewed.contains(&id) => held.renewed = Instant::now(),
+                    None if renewed.contains(&id)
+                        && let Some((job, batch)) = batch_of(&id) =>
+                    {
+                        book.hold(LeaseRow { id, job, batch, worker: worker.clone() }, None);
+                    }
                     _ => lost.push(id),
                 }
             }
@@ -143,86 +141,170 @@ impl Farm {
         Ok(lost)
     }
 
-    async fn hand_out(&self, worker: &WorkerId, said: &Exchange) -> Result<Vec<Lease>> {
+    async fn hand_out(&self, worker: &WorkerId, join: &WorkerJoin, said: &Exchange) -> Result<Vec<Lease>> {
+        let active = self.crew().active(self.rules.silence) as usize;
         let wants = said.wants.min(self.rules.wants_max);
+        let mut leases = Vec::new();
+        // Another server may have been faster: what is left is known after the first try.
+        for _ in 0..3 {
+            let left = wants - leases.len() as u32;
+            let asker = Asker { id: worker, join, scenes: &said.scenes, wants: left, active };
+            let (handed_out, refused) = self.claim_offers(&asker).await?;
+            leases.extend(handed_out);
+            if refused.is_empty() || !self.is_shared() {
+                break;
+            }
+            for job in &refused {
+                self.refresh_plan(job).await?;
+            }
+        }
+        Ok(leases)
+    }
+
+    /// Claims what the book offers; also returns the jobs of whose batches some were refused.
+    async fn claim_offers(&self, asker: &Asker<'_>) -> Result<(Vec<Lease>, BTreeSet<JobId>)> {
+        let Asker { id: worker, join, .. } = *asker;
         // Twice what workers hold or would take: none stands idle while a checkpoint is taken.
         let ahead = 2 * self.crew().capacity(self.rules.silence);
-        let offers = self.book().offer(wants, &said.scenes, ahead);
+        let offers = self.book().offer(asker, ahead);
         if offers.is_empty() {
-            return Ok(Vec::new());
+            return Ok((Vec::new(), BTreeSet::new()));
         }
-        let claims: Vec<Claim> = (offers.iter())
-            .map(|Offer { job, batch, .. }| Claim {
-                lease: self.ids.lease(job, *batch),
-                job: job.clone(),
-                batch: *batch,
-                worker: worker.clone(),
-            })
-            .collect();
-        let claimed = match self.store.claim(claims.clone(), self.rules.lease).await {
+        let ids: Vec<LeaseId> = offers.iter().map(|offer| self.ids.lease(&offer.job, offer.batch)).collect();
+        let claimed = match self.claim(worker, join, &offers, &ids).await {
             Ok(claimed) => claimed,
             Err(error) => {
                 let mut book = self.book();
-                for offer in &offers {
-                    book.put_back(&offer.job, offer.batch);
-                }
-                return Err(error.into());
+                offers.into_iter().for_each(|offer| book.withdraw(offer));
+                return Err(error);
             }
         };
         let mut leases = Vec::new();
-        let mut begun = Vec::new();
-        for ((offer, claim), claimed) in offers.into_iter().zip(claims).zip(claimed) {
+        let (mut begun, mut refused) = (Vec::new(), BTreeSet::new());
+        for ((offer, id), claimed) in offers.into_iter().zip(ids).zip(claimed) {
             let batch = self.live(&offer.job).and_then(|live| live.batch(offer.batch));
-            // Not claimed: the job was paused or ended meanwhile.
+            // Not claimed: the job was paused or ended meanwhile, or began elsewhere on other processors.
             let (true, Some(batch)) = (claimed, batch) else {
-                self.book().put_back(&offer.job, offer.batch);
+                refused.insert(offer.job.clone());
+                self.book().withdraw(offer);
                 continue;
             };
-            let Claim { lease, job, batch: key, worker } = claim;
-            self.book().hold(LeaseRow { id: lease.clone(), job: job.clone(), batch: key, worker });
+            let Offer { job, batch: key, scene, settings, audit, .. } = offer;
+            let upload = if audit.is_some() { None } else { self.upload_to(&id).await };
+            let row = LeaseRow { id: id.clone(), job: job.clone(), batch: key, worker: worker.clone() };
+            self.book().hold(row, audit);
+            let seconds = self.rules.lease.as_secs_f64();
             leases.push(Lease {
-                id: lease,
+                id,
                 job: job.clone(),
-                scene: offer.scene,
-                settings: offer.settings.as_ref().clone(),
+                scene,
+                settings: settings.as_ref().clone(),
                 batch,
-                seconds: self.rules.lease.as_secs_f64(),
+                seconds,
+                upload,
             });
             begun.push(job);
         }
         begun.dedup();
         begun.iter().filter_map(|job| self.live(job)).for_each(|live| live.changed());
-        Ok(leases)
+        Ok((leases, refused))
+    }
+
+    /// Where a lease's sum may be put directly.
+    async fn upload_to(&self, lease: &LeaseId) -> Option<String> {
+        let address = self.blobs.address_to_put(&BlobName::Handed(lease.clone()), UPLOAD).await;
+        // Without one it is brought to the farm.
+        address.inspect_err(|error| tracing::warn!(%error, "no address to put sums at")).ok().flatten()
+    }
+
+    /// Claims what is offered in the store; whether each may be handed out. Jobs that are not pinned to a
+    /// class of processors are pinned to that of the first worker.
+    async fn claim(
+        &self,
+        worker: &WorkerId,
+        join: &WorkerJoin,
+        offers: &[Offer],
+        ids: &[LeaseId],
+    ) -> Result<Vec<bool>> {
+        let mut claimed = Vec::with_capacity(offers.len());
+        for job in offers.iter().filter(|offer| !offer.pinned).map(|offer| &offer.job) {
+            if self.book().job(job).is_some_and(|entry| entry.wants.class.is_none()) {
+                let class = self.store.pin_job(job, &join.instruction_set).await?;
+                if let Some(entry) = self.book().job(job) {
+                    entry.wants.class = class;
+                }
+            }
+        }
+        let mut claims = Vec::new();
+        for (Offer { job, batch, audit, .. }, lease) in offers.iter().zip(ids) {
+            let class = self.book().job(job).and_then(|entry| entry.wants.class.clone());
+            let right = class.as_ref() == Some(&join.instruction_set);
+            claimed.push(right && audit.is_some());
+            if right && audit.is_none() {
+                let (job, worker) = (job.clone(), worker.clone());
+                claims.push((claimed.len() - 1, Claim { lease: lease.clone(), job, batch: *batch, worker }));
+            }
+        }
+        let (places, claims): (Vec<usize>, Vec<Claim>) = claims.into_iter().unzip();
+        if !claims.is_empty() {
+            for (place, yes) in places.into_iter().zip(self.store.claim(claims, self.rules.lease).await?) {
+                claimed[place] = yes;
+            }
+        }
+        Ok(claimed)
     }
 
     /// A worker gives a batch back.
     pub async fn give_back(&self, lease: &LeaseId, failure: LeaseFailure) -> Result<()> {
-        let reason: String = failure.reason.chars().take(1000).collect();
+        let reason: String = failure.reason.chars().filter(|c| !c.is_control()).take(1000).collect();
+        let audit = self.book().end_audit(lease);
+        if let Some((row, audit)) = audit {
+            self.book().audits.ask(row.job, row.batch, audit);
+            return Ok(());
+        }
         let counted = (failure.kind != FailureKind::HandedBack).then(|| reason.clone());
         let Some(released) = self.store.release(lease, counted).await? else {
             return Err(FarmError::not_found("lease", lease));
         };
         self.book().take_back(&released.lease);
-        match failure.kind {
-            FailureKind::HandedBack => Ok(()),
-            FailureKind::Job => {
-                self.counters.count(Fate::Failed);
-                self.fail(&released.lease.job, reason).await
-            }
-            FailureKind::Worker => {
-                self.counters.count(Fate::Failed);
-                self.crew().strike(&released.lease.worker, self.rules.rest);
-                self.judge(&released, &reason).await
-            }
+        if failure.kind == FailureKind::HandedBack {
+            return Ok(());
         }
+        self.counters.count(Fate::Failed);
+        let LeaseRow { job, batch, worker, .. } = &released.lease;
+        if let Some(entry) = self.book().job(job) {
+            entry.failed.entry(*batch).or_default().insert(worker.clone());
+        }
+        if failure.kind == FailureKind::Worker {
+            self.crew().strike(worker, self.rules.rest);
+            self.blame(worker, job, &reason).await?;
+        }
+        self.judge(&released, failure.kind, &reason).await
     }
 
-    /// Fails a job one of whose batches fails again and again.
-    pub(super) async fn judge(&self, released: &Released, reason: &str) -> Result<()> {
+    /// A worker failed at a job by its own fault: where it does so at several, it is put aside.
+    pub(super) async fn blame(&self, worker: &WorkerId, job: &JobId, reason: &str) -> Result<()> {
+        let jobs = self.crew().blame(worker, job);
+        if jobs < self.rules.failing_jobs {
+            return Ok(());
+        }
+        let text = format!("it failed at {jobs} jobs, the last time because: {reason}");
+        self.put_aside(worker, &text).await
+    }
+
+    /// Fails a job one of whose batches fails again and again. What seems the job's fault needs the word of
+    /// several workers, where there are several.
+    pub(super) async fn judge(&self, released: &Released, kind: FailureKind, reason: &str) -> Result<()> {
         let Released { lease, failures, workers, losses } = released;
         tracing::warn!(lease = %lease.id, worker = %lease.worker, failures, losses, reason, "a batch came back");
+        let all = self.crew().active(self.rules.silence).max(1);
+        let jobs_fault = kind == FailureKind::Job
+            && *failures >= self.rules.failing_workers
+            && *workers >= self.rules.failing_workers.min(all);
         let given_back = *workers >= self.rules.failing_workers || *failures >= self.rules.failures;
-        let text = if given_back {
+        let text = if jobs_fault || given_back && kind == FailureKind::Job {
+            reason.to_owned()
+        } else if given_back {
             format!(
                 "{} failed {failures} times on {workers} workers, the last time because: {reason}",
                 lease.batch

@@ -1,7 +1,7 @@
 //! A job that is not over, in memory.
 
 use super::{append::Merge, spec::JobSpec};
-use crate::store::row::{BatchKey, CommitRow, JobRow, Progress};
+use crate::store::row::{BatchKey, CommitRow, JobRow, Mandate, Progress};
 use bytes::Bytes;
 use ovtigre_core::film::{schedule::Schedule, sum::Sum};
 use ovtigre_proto::{
@@ -88,6 +88,22 @@ pub struct Live {
     view: Mutex<View>,
     ending: Mutex<Option<Ending>>,
     made: Mutex<Option<Made>>,
+    others: Mutex<Others>,
+}
+
+/// What this server knows of the others' part in a job.
+#[derive(Debug, Default)]
+struct Others {
+    /// The right to append to its sums, where this server has it.
+    mandate: Option<Mandate>,
+    /// Whether another server had it when this one asked last.
+    elsewhere: bool,
+    /// Batches brought that were taken up.
+    brought: u64,
+    /// Its version when it was looked at last.
+    version: u64,
+    /// What the others were told.
+    told: Option<Progress>,
 }
 
 impl Live {
@@ -106,6 +122,7 @@ impl Live {
             view: Mutex::new(View { progress: row.progress, manifest: None, curve, layers }),
             ending: Mutex::default(),
             made: Mutex::default(),
+            others: Mutex::new(Others { version: row.version, ..Others::default() }),
         }
     }
 
@@ -164,6 +181,46 @@ impl Live {
     /// Keeps a picture's file.
     pub fn set_made(&self, made: Made) {
         *held(&self.made) = Some(made);
+    }
+
+    /// The right to append to its sums, where this server has it.
+    pub fn mandate(&self) -> Option<Mandate> {
+        held(&self.others).mandate
+    }
+
+    /// This server has the right to append to its sums, or not any more.
+    pub fn set_mandate(&self, mandate: Option<Mandate>) {
+        held(&self.others).mandate = mandate;
+    }
+
+    /// Whether another server appends, as far as is known.
+    pub fn is_elsewhere(&self) -> bool {
+        held(&self.others).elsewhere
+    }
+
+    /// Another server appends, or none.
+    pub fn set_elsewhere(&self, elsewhere: bool) {
+        held(&self.others).elsewhere = elsewhere;
+    }
+
+    /// Batches brought that were taken up, in the order of coming.
+    pub fn brought(&self) -> u64 {
+        held(&self.others).brought
+    }
+
+    /// So many were taken up.
+    pub fn set_brought(&self, brought: u64) {
+        held(&self.others).brought = brought;
+    }
+
+    /// Whether `version` is new since the last call.
+    pub fn note_version(&self, version: u64) -> bool {
+        std::mem::replace(&mut held(&self.others).version, version) != version
+    }
+
+    /// Whether `progress` is new to the other servers since the last call.
+    pub fn note_told(&self, progress: Progress) -> bool {
+        held(&self.others).told.replace(progress) != Some(progress)
     }
 
     /// The batch at `key`, where the schedule has it.

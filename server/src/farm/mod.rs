@@ -1,6 +1,7 @@
 //! Rules, no HTTP: submit, split, lease, commit, append, checkpoint, stop, reap.
 
 pub mod append;
+pub mod audit;
 pub mod book;
 pub mod checkpoint;
 pub mod commit;
@@ -9,10 +10,14 @@ pub mod counters;
 pub mod crew;
 pub mod curve;
 pub mod error;
+pub mod extend;
 pub mod ids;
+pub mod join;
 pub mod lease;
 pub mod live;
+pub mod mandates;
 pub mod open;
+pub mod others;
 pub mod paths;
 pub mod picture;
 pub mod reach;
@@ -20,6 +25,7 @@ pub mod reap;
 pub mod rules;
 pub mod scene;
 pub mod solution;
+pub mod space;
 pub mod spec;
 pub mod split;
 pub mod status;
@@ -61,8 +67,11 @@ pub struct Farm {
     pub counters: Counters,
     /// Cancelled when it stops.
     pub stopping: CancellationToken,
+    /// Its name among the servers over the same store.
+    name: String,
     inspect: Inspect,
     ids: Ids,
+    fullness: space::Fullness,
     tasks: TaskTracker,
     decoders: tokio::sync::Semaphore,
     inspectors: tokio::sync::Semaphore,
@@ -92,6 +101,8 @@ impl Farm {
     fn forget_live(&self, id: &JobId) {
         if let Some(live) = held(&self.lives).remove(id) {
             live.changed();
+            // Ends the task that appends to it.
+            live.kick.notify_one();
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::{
     Farm,
-    book::{Entry, HandOut},
+    book::{self, HandOut},
     error::{FarmError, Result},
     live::{Ending, Live, Waits, held},
     rules::Rules,
@@ -16,14 +16,18 @@ use crate::{
 };
 use ovtigre_proto::status::JobState;
 use std::{
+    collections::btree_map::Entry,
     num::NonZero,
     sync::{Arc, Mutex},
     thread::available_parallelism,
+    time::Duration,
 };
 use tokio::sync::Semaphore;
 
 /// Scenes looked into at a time: each is in memory whole.
 const INSPECTORS: usize = 2;
+/// Uploads that were begun so long ago were cut off.
+pub(super) const UPLOAD_MAX: Duration = Duration::from_hours(24);
 
 impl Farm {
     /// A farm that goes on where the last one over the same store and blobs ended, however it ended.
@@ -34,14 +38,17 @@ impl Farm {
         rules: Rules,
     ) -> Result<Arc<Self>> {
         let processors = available_parallelism().map_or(1, NonZero::get);
+        let ids = super::ids::Ids::new();
         let farm = Arc::new(Self {
             store,
             blobs,
             rules,
+            name: ids.text(16),
             counters: super::counters::Counters::default(),
             stopping: tokio_util::sync::CancellationToken::new(),
             inspect,
-            ids: super::ids::Ids::new(),
+            fullness: super::space::Fullness::default(),
+            ids,
             tasks: tokio_util::task::TaskTracker::new(),
             decoders: Semaphore::new(processors),
             inspectors: Semaphore::new(INSPECTORS),
@@ -49,7 +56,17 @@ impl Farm {
             crew: Mutex::default(),
             lives: Mutex::default(),
         });
-        farm.sweep().await?;
+        farm.look_at_room();
+        if farm.is_shared() {
+            let farm = Arc::clone(&farm);
+            farm.tasks.clone().spawn(async move {
+                if let Err(error) = farm.sweep().await {
+                    tracing::warn!(%error, "files that nobody needs were not removed");
+                }
+            });
+        } else {
+            farm.sweep().await?;
+        }
         for row in farm.store.unsettled_jobs().await? {
             farm.take_up(&row).await?;
         }
@@ -62,12 +79,19 @@ impl Farm {
         self.stopping.cancel();
         self.tasks.close();
         self.tasks.wait().await;
+        if let Err(error) = self.store.leave_merges(&self.name).await {
+            tracing::warn!(%error, "other servers go on only after a while");
+        }
         self.store.close().await;
     }
 
     /// Removes uploads that were cut off, and files of jobs that are over or that are not there.
     async fn sweep(&self) -> Result<()> {
-        self.blobs.delete_all(&BlobFolder::Incoming).await?;
+        if self.is_shared() {
+            self.blobs.delete_older(&BlobFolder::Incoming, UPLOAD_MAX).await?;
+        } else {
+            self.blobs.delete_all(&BlobFolder::Incoming).await?;
+        }
         for id in self.blobs.jobs().await? {
             match self.store.job(&id).await? {
                 None => self.blobs.delete_all(&BlobFolder::Job(id)).await?,
@@ -84,7 +108,10 @@ impl Farm {
         let curve = self.store.curve(&row.id).await?;
         let layers = self.store.layers(&row.id).await?;
         let live = Arc::new(Live::new(row, spec, curve, layers));
-        held(&self.lives).insert(row.id.clone(), Arc::clone(&live));
+        match held(&self.lives).entry(row.id.clone()) {
+            Entry::Occupied(_) => return Ok(()),
+            Entry::Vacant(place) => place.insert(Arc::clone(&live)),
+        };
         if row.state.is_over() {
             live.end(Ending { state: row.state, reason: None, certified: false, waits: Waits::Not });
         } else {
@@ -103,10 +130,12 @@ impl Farm {
         let plan = Plan::new(schedule, ledger.cursors, ledger.returned, ledger.checkpoints);
         let hand_out = if row.state == JobState::Paused { HandOut::Paused } else { HandOut::Yes };
         let settings = live.spec.settings.clone();
-        let entry = Entry::new(row.scene.clone(), settings, plan, row.priority, row.sequence, hand_out);
+        let wants = live.spec.wants(row.class.clone());
+        let order = (row.priority, row.sequence);
+        let entry = book::Entry::new(row.scene.clone(), settings, plan, order, hand_out, wants);
         let mut book = self.book();
         book.add(row.id.clone(), entry);
-        ledger.leases.into_iter().for_each(|lease| book.hold(lease));
+        ledger.leases.into_iter().for_each(|lease| book.hold(lease, None));
         Ok(())
     }
 }

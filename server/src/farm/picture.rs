@@ -8,7 +8,7 @@ use super::{
     open::read_spec,
 };
 use crate::{
-    blobs::BlobName,
+    blobs::{BlobError, BlobName},
     store::row::{JobRow, Progress},
 };
 use bytes::Bytes;
@@ -109,8 +109,9 @@ impl Farm {
             None => Ok(row.manifest),
             Some(live) => {
                 let known = live.view().manifest;
-                // After a restart the sums are not in memory yet.
-                if known.is_none() && live.view().progress.batches > 0 {
+                // After a restart the sums are not in memory yet; what another server appends to never is.
+                let elsewhere = self.is_shared() && live.mandate().is_none();
+                if (known.is_none() || elsewhere) && live.view().progress.batches > 0 {
                     drop(self.sums(&live).await?);
                     return Ok(live.view().manifest);
                 }
@@ -140,14 +141,27 @@ impl Farm {
     /// The picture so far, and the set of batches in it.
     pub async fn exr(&self, id: &JobId) -> Result<(String, ExrFile)> {
         let row = self.job_row(id).await?;
-        if let (true, Some(manifest)) = (row.settled, row.manifest) {
-            let name = BlobName::Result(id.clone());
-            let size = self.blobs.size(&name).await?;
+        if let (true, Some(manifest)) = (row.settled, row.manifest.clone()) {
+            let (name, size) = self.kept(id, &manifest).await?;
             return Ok((manifest, ExrFile::Kept { name, size }));
         }
-        let live = self.live(id).filter(|_| !row.settled).ok_or_else(|| FarmError::NoPicture(id.clone()))?;
+        let live = self.live(id).filter(|_| !row.settled).ok_or_else(|| FarmError::no_picture(&row))?;
         let made = self.make_exr(&live).await?;
         Ok((made.manifest, ExrFile::Memory(made.bytes)))
+    }
+
+    /// The name and size of the file of a job that is over.
+    async fn kept(&self, id: &JobId, manifest: &str) -> Result<(BlobName, u64)> {
+        let name = BlobName::Result(id.clone(), manifest.to_owned());
+        match self.blobs.size(&name).await {
+            Ok(size) => Ok((name, size)),
+            Err(BlobError::Missing(_)) => {
+                let name = BlobName::OldResult(id.clone());
+                let size = self.blobs.size(&name).await?;
+                Ok((name, size))
+            }
+            Err(error) => Err(error.into()),
+        }
     }
 
     /// Some bytes of a picture's file.
@@ -162,7 +176,7 @@ impl Farm {
     pub async fn exr_stream(
         &self,
         name: &BlobName,
-    ) -> Result<BoxStream<'static, std::result::Result<Bytes, crate::blobs::BlobError>>> {
+    ) -> Result<BoxStream<'static, std::result::Result<Bytes, BlobError>>> {
         Ok(self.blobs.stream(name).await?.1)
     }
 
@@ -196,13 +210,13 @@ impl Farm {
         let (plane, part) = plane.ok_or_else(|| FarmError::NoLayer(layer.to_string()))?;
         let region = spec.region;
         if let (true, Some(manifest)) = (row.settled, &row.manifest) {
-            let exr = self.blobs.get(&BlobName::Result(id.clone())).await?;
+            let exr = self.blobs.get(&self.kept(id, manifest).await?.0).await?;
             let name = plane.checked_sub(1).map(|i| spec.settings.layers[i].name.as_str());
             let prefix = prefix_of(name, part);
             let png = blocking(move || develop_kept(&exr, region, &prefix, &develop)).await??;
             return Ok((manifest.clone(), png));
         }
-        let live = self.live(id).filter(|_| !row.settled).ok_or_else(|| FarmError::NoPicture(id.clone()))?;
+        let live = self.live(id).filter(|_| !row.settled).ok_or_else(|| FarmError::no_picture(&row))?;
         let held = self.sums(&live).await?;
         let manifest = held.as_ref().and_then(|merge| merge.manifest(&live.identity));
         let manifest = manifest.ok_or_else(|| FarmError::NoPicture(id.clone()))?;

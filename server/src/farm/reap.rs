@@ -5,9 +5,14 @@ use super::{
     counters::Fate,
     error::{FarmError, Result},
     live::{Ending, Live, Waits},
+    open::UPLOAD_MAX,
 };
-use ovtigre_proto::status::JobState;
-use std::{sync::Arc, time::Duration};
+use crate::{blobs::BlobFolder, store::error::StoreError};
+use ovtigre_proto::{lease::FailureKind, status::JobState};
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 /// How long a job rests after its store or its files failed.
 const REST: Duration = Duration::from_secs(1);
@@ -15,13 +20,17 @@ const REST: Duration = Duration::from_secs(1);
 impl Farm {
     /// Leases that ran out go back, silent workers are lost, jobs whose time is over end.
     pub async fn reap(&self) -> Result<()> {
+        self.look_at_room();
         for released in self.store.expire().await? {
             self.counters.count(Fate::Expired);
             self.book().take_back(&released.lease);
             if let Some(live) = self.live(&released.lease.job) {
                 live.changed();
             }
-            self.judge(&released, "its worker was not heard of in time").await?;
+            self.judge(&released, FailureKind::HandedBack, "its worker was not heard of in time").await?;
+        }
+        if let Some(before) = Instant::now().checked_sub(self.rules.lease) {
+            self.drop_audits(before, None);
         }
         for worker in self.store.lose_workers(self.rules.silence).await? {
             tracing::warn!(%worker, "worker is lost");
@@ -46,17 +55,36 @@ impl Farm {
     pub(super) async fn tick(self: Arc<Self>) {
         let mut beat = tokio::time::interval(self.rules.tick);
         beat.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
+        let mut keep = tokio::time::interval(self.rules.keep_mandate);
+        keep.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
         let mut hour = tokio::time::interval(Duration::from_hours(1));
         loop {
             let done = tokio::select! {
                 () = self.stopping.cancelled() => return,
-                _ = beat.tick() => self.reap().await,
-                _ = hour.tick() => self.store.forget_keys(self.rules.keys).await.map_err(FarmError::from),
+                _ = keep.tick() => self.keep_and_tell().await,
+                _ = beat.tick() => self.reap_and_follow().await,
+                _ = hour.tick() => self.forget_old().await,
             };
             if let Err(error) = done {
                 tracing::error!(%error, "looking after leases and deadlines failed");
             }
         }
+    }
+
+    /// Forgets idempotency keys, and uploads that were cut off.
+    async fn forget_old(&self) -> Result<()> {
+        self.store.forget_keys(self.rules.keys).await?;
+        Ok(self.blobs.delete_older(&BlobFolder::Incoming, UPLOAD_MAX).await?)
+    }
+
+    async fn reap_and_follow(self: &Arc<Self>) -> Result<()> {
+        self.follow_others().await?;
+        self.reap().await
+    }
+
+    async fn keep_and_tell(&self) -> Result<()> {
+        self.keep_mandates().await?;
+        self.tell_others().await
     }
 
     /// Appends what comes until the job is over.
@@ -72,6 +100,7 @@ impl Farm {
             match self.advance(&live).await {
                 Ok(true) => return,
                 Ok(false) => {}
+                Err(FarmError::Store(StoreError::Superseded)) => self.lose(&live).await,
                 Err(error) => {
                     // What is in memory may be half done: it is built again from what is kept.
                     *live.merge.lock().await = None;
@@ -93,6 +122,10 @@ impl Farm {
             let failed = self.settle_without_picture(live, error.to_string()).await;
             match failed {
                 Ok(()) => return true,
+                Err(FarmError::Store(StoreError::Superseded)) => {
+                    self.lose(live).await;
+                    return false;
+                }
                 Err(error) => tracing::error!(job = %live.id, %error, "the job could not be failed"),
             }
         }

@@ -74,6 +74,7 @@ pub enum Novelty {
 impl Farm {
     /// Begins an upload.
     pub async fn receive(&self) -> Result<Incoming> {
+        self.need_room()?;
         let upload = self.blobs.upload(self.ids.text(16)).await?;
         Ok(Incoming { upload, hasher: blake3::Hasher::new(), bytes: 0, limit: self.rules.scene_bytes })
     }

@@ -1,12 +1,17 @@
 //! A job, resolved: what is kept of it in the store's `spec`.
 
+use super::book::Wants;
 use ovtigre_core::{
-    film::{schedule::Schedule, size::Region},
+    film::{
+        schedule::Schedule,
+        size::{Region, Size},
+    },
     path::reach::Unreachable,
-    settings::Settings,
+    settings::{CameraChoice, FULL, Gloss, Method, Settings, Shadows, Shutter, Weights},
 };
 use ovtigre_proto::{id::BlobId, job::JobRequest};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, de::Error as _};
+use serde_json::Value;
 
 /// A job with every default resolved.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -14,6 +19,7 @@ pub struct JobSpec {
     /// What was asked for.
     pub request: JobRequest,
     /// What is rendered.
+    #[serde(deserialize_with = "stored")]
     pub settings: Settings,
     /// Pixels that are rendered.
     pub region: Region,
@@ -23,6 +29,12 @@ pub struct JobSpec {
     pub error_target: Option<f64>,
     /// Seconds of run time to stop after.
     pub seconds: Option<f64>,
+    /// Version of the program whose workers render it; any where it is empty.
+    #[serde(default)]
+    pub build: String,
+    /// The id of the token that sent it.
+    #[serde(default)]
+    pub owner: Option<String>,
     /// Why the method was chosen.
     pub method_reason: String,
     /// Paths that are asked for and that no technique of the method makes.
@@ -33,6 +45,17 @@ pub struct JobSpec {
 }
 
 impl JobSpec {
+    /// Who may render it; `class` is that of the processors that began it.
+    pub fn wants(&self, class: Option<String>) -> Wants {
+        Wants {
+            build: self.build.clone(),
+            class,
+            tags: self.request.tags.clone(),
+            max_workers: self.request.max_workers,
+            weight: self.request.weight.unwrap_or(1).max(1),
+        }
+    }
+
     /// Its batches.
     pub fn schedule(&self) -> Schedule {
         let Settings { method, replicates, .. } = self.settings;
@@ -71,5 +94,66 @@ impl JobSpec {
             hasher.update(&n.to_le_bytes());
         }
         hasher.finalize()
+    }
+}
+
+/// What a job's settings were where its document does not say: jobs of earlier versions were rendered so.
+fn before() -> Settings {
+    Settings {
+        size: Size { width: 1, height: 1 },
+        camera: CameraChoice::Framed,
+        variant: None,
+        method: Method::Path,
+        paths: FULL.to_owned(),
+        layers: Vec::new(),
+        gloss: Gloss::AsItIs,
+        strategies: Vec::new(),
+        weights: Weights::Balance,
+        bounces: None,
+        lens: None,
+        shutter: Shutter::default(),
+        environment: None,
+        shadows: Shadows::On,
+        seed: 0,
+        replicates: 1,
+    }
+}
+
+/// Settings as this version or an earlier one stored them.
+fn stored<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Settings, D::Error> {
+    let mut says = serde_json::Map::<String, Value>::deserialize(deserializer)?;
+    if let Ok(Value::Object(before)) = serde_json::to_value(before()) {
+        for (name, value) in before {
+            says.entry(name).or_insert(value);
+        }
+    }
+    serde_json::from_value(Value::Object(says)).map_err(D::Error::custom)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// As the first version stored it.
+    const FIRST: &str = r#"{"request":{"scene":"0000000000000000000000000000000000000000000000000000000000000001",
+        "samples":16},"settings":{"size":{"width":40,"height":30},"camera":"framed","method":"path","bounces":null,
+        "lens":null,"environment":null,"shadows":"on","seed":7,"replicates":4},"region":{"x":0,"y":0,"width":40,
+        "height":30},"samples":4,"error_target":null,"seconds":null,"paths":"L(D|S)*E","method_reason":"the only one",
+        "warnings":[]}"#;
+
+    #[test]
+    fn a_job_that_the_first_version_took_is_read_as_it_was_meant() {
+        let spec: JobSpec = serde_json::from_str(FIRST).unwrap();
+        assert_eq!((spec.settings.seed, spec.settings.replicates, spec.samples), (7, 4, 4));
+        assert_eq!((&*spec.settings.paths, spec.settings.layers.len()), (FULL, 0));
+        let again: JobSpec = serde_json::from_str(&serde_json::to_string(&spec).unwrap()).unwrap();
+        assert_eq!(again, spec);
+    }
+
+    #[test]
+    fn settings_of_a_later_version_are_refused() {
+        let later = FIRST.replace(r#""seed":7"#, r#""seed":7,"later":1"#);
+        let error = serde_json::from_str::<JobSpec>(&later).unwrap_err().to_string();
+        assert!(error.contains("later"), "{error}");
     }
 }

@@ -53,9 +53,11 @@ impl Plan {
         &self.schedule
     }
 
-    /// The next batch to hand out, with at most `ahead` batches past the next checkpoint in hands.
-    pub fn take(&mut self, ahead: u64) -> Option<BatchKey> {
-        let batch = [self.returned.first(), self.next.first()].into_iter().flatten().min().copied()?;
+    /// The next batch to hand out, with at most `ahead` batches past the next checkpoint in hands, and
+    /// without those that came back and that `shun` names.
+    pub fn take(&mut self, ahead: u64, shun: impl Fn(BatchKey) -> bool) -> Option<BatchKey> {
+        let returned = self.returned.iter().find(|batch| !shun(**batch));
+        let batch = [returned, self.next.first()].into_iter().flatten().min().copied()?;
         if batch.block >= self.limit() && self.past_limit() >= ahead {
             return None;
         }
@@ -66,6 +68,15 @@ impl Plan {
             }
         }
         Some(batch)
+    }
+
+    /// Goes on where `cursors` and `returned` say, whatever was handed out here.
+    pub fn refresh(
+        &mut self,
+        cursors: impl IntoIterator<Item = (Lane, u32)>,
+        returned: impl IntoIterator<Item = BatchKey>,
+    ) {
+        *self = Self::new(Arc::clone(&self.schedule), cursors, returned, self.reached as u32);
     }
 
     /// A batch that was handed out comes back.
@@ -125,7 +136,7 @@ mod tests {
     fn replicates_advance_together_and_every_batch_is_handed_out_once() {
         let mut plan = plan(100);
         let mut taken = BTreeMap::new();
-        while let Some(batch) = plan.take(u64::MAX) {
+        while let Some(batch) = plan.take(u64::MAX, |_| false) {
             *taken.entry(batch).or_insert(0) += 1;
             let blocks = taken.keys().map(|b| b.block);
             assert!(batch.block + 1 >= blocks.max().unwrap(), "{batch} came late");
@@ -137,20 +148,20 @@ mod tests {
     #[test]
     fn a_batch_that_came_back_goes_first() {
         let mut plan = plan(100);
-        let first = plan.take(0).unwrap();
-        let second = plan.take(0).unwrap();
+        let first = plan.take(0, |_| false).unwrap();
+        let second = plan.take(0, |_| false).unwrap();
         plan.put_back(second);
         plan.put_back(first);
-        assert_eq!(plan.take(0), Some(first));
+        assert_eq!(plan.take(0, |_| false), Some(first));
         plan.brought(second);
-        assert_ne!(plan.take(0), Some(second));
+        assert_ne!(plan.take(0, |_| false), Some(second));
     }
 
     #[test]
     fn look_ahead_past_a_checkpoint_is_bounded() {
         let mut plan = plan(100);
         // The first checkpoint is after one block of each of three replicates.
-        let count = |plan: &mut Plan, ahead| std::iter::from_fn(|| plan.take(ahead)).count();
+        let count = |plan: &mut Plan, ahead| std::iter::from_fn(|| plan.take(ahead, |_| false)).count();
         assert_eq!(plan.waiting(), 3);
         assert_eq!(count(&mut plan, 2), 5);
         assert_eq!(count(&mut plan, 4), 2);
@@ -168,7 +179,7 @@ mod tests {
         let returned = lane(1).at(2);
         let mut plan =
             Plan::new(schedule, [(lane(0), 3), (lane(1), blocks), (lane(2), 4)], [returned], u32::MAX);
-        assert_eq!(plan.take(0), Some(returned));
-        assert_eq!(plan.take(0), Some(lane(0).at(3)));
+        assert_eq!(plan.take(0, |_| false), Some(returned));
+        assert_eq!(plan.take(0, |_| false), Some(lane(0).at(3)));
     }
 }

@@ -87,6 +87,7 @@ impl Farm {
             eta_seconds,
             method: spec.settings.method.name().to_owned(),
             method_reason: spec.method_reason,
+            class: row.class.clone(),
             paths: shown(&spec.settings.paths).to_owned(),
             unreachable: spec.unreachable,
             radiosity,
@@ -136,7 +137,7 @@ impl Farm {
     /// A worker gets no more batches; one that is lost is let go.
     pub async fn drain(&self, id: &WorkerId) -> Result<WorkerStatus> {
         let state = match self.worker_row(id).await?.state {
-            WorkerState::Active | WorkerState::Draining => WorkerState::Draining,
+            WorkerState::Active | WorkerState::Draining | WorkerState::Aside => WorkerState::Draining,
             WorkerState::Lost | WorkerState::Gone => WorkerState::Gone,
         };
         self.store.set_worker_state(id, state).await?;
@@ -170,6 +171,7 @@ fn worker_status(row: WorkerRow) -> WorkerStatus {
         batches_done: row.batches_done,
         failures: row.failures,
         rays_per_second: row.rays_per_second,
+        reason: row.reason,
     }
 }
 

@@ -4,7 +4,7 @@ use super::{
     Farm,
     append::{Held, Merge},
     error::{FarmError, Result},
-    live::{Ending, Live, Waits},
+    live::{Ending, Live, Made, Waits},
 };
 use crate::{
     blobs::{BlobFolder, BlobName},
@@ -21,16 +21,21 @@ pub(super) fn can_end(merge: &Merge, ending: &Ending) -> bool {
 impl Farm {
     /// Writes the picture that stays, then the job's last row, then removes what is not needed.
     pub(super) async fn finish(&self, live: &Arc<Live>, held: Held, ending: Ending) -> Result<()> {
+        let mandate = Self::mandate(live)?;
         self.book().remove(&live.id);
         let held = self.last_look(live, held).await?;
         let merge = held.as_ref().expect("loaded by the caller");
         let (progress, manifest) = (merge.progress(), merge.manifest(&live.identity));
         drop(held);
         if manifest.is_some() {
-            let made = self.make_exr(live).await?;
-            self.blobs.put(&BlobName::Result(live.id.clone()), made.bytes).await?;
+            let Made { manifest, bytes } = self.make_exr(live).await?;
+            self.blobs.put(&BlobName::Result(live.id.clone(), manifest), bytes).await?;
         }
-        let settlement = Settlement { progress, manifest, certified: ending.certified };
+        match ending.state {
+            JobState::Done => self.keep_sums(live).await?,
+            _ => self.drop_sums(live).await?,
+        }
+        let settlement = Settlement { mandate, progress, manifest, certified: ending.certified };
         let change = |row: &JobRow| {
             let over = row.state.is_over();
             Some(JobChange {
@@ -58,7 +63,8 @@ impl Farm {
     pub(super) async fn settle_without_picture(&self, live: &Live, reason: String) -> Result<()> {
         self.book().remove(&live.id);
         let progress = live.view().progress;
-        let settlement = Settlement { progress, manifest: None, certified: false };
+        let settlement =
+            Settlement { mandate: Self::mandate(live)?, progress, manifest: None, certified: false };
         let change = |row: &JobRow| {
             let over = row.state.is_over();
             Some(JobChange {
@@ -68,15 +74,18 @@ impl Farm {
                 settlement: Some(settlement.clone()),
             })
         };
+        self.drop_sums(live).await?;
         self.change(&live.id, change).await?;
         self.forget_live(&live.id);
         self.remove_leftovers(&live.id).await
     }
 
-    /// Removes partials and sums of a job that is over.
+    /// Removes partials of a job that is over, and its sums unless they are kept.
     pub(super) async fn remove_leftovers(&self, id: &JobId) -> Result<()> {
         self.blobs.delete_all(&BlobFolder::Partials(id.clone())).await?;
-        self.blobs.delete_all(&BlobFolder::Prefixes(id.clone())).await?;
+        if self.store.ledger(id).await?.snapshots.is_empty() {
+            self.blobs.delete_all(&BlobFolder::Prefixes(id.clone())).await?;
+        }
         Ok(())
     }
 

@@ -24,11 +24,15 @@ use ovtigre_proto::{
 use std::sync::Arc;
 
 /// Samples a pixel of a job, at most.
-const SAMPLES_MAX: u32 = 1 << 22;
+pub(super) const SAMPLES_MAX: u32 = 1 << 22;
 /// Replicates of a job, at most.
 const REPLICATES_MAX: u32 = 256;
 /// Longest name.
 const NAME_MAX: usize = 200;
+/// Largest weight.
+pub(super) const WEIGHT_MAX: u32 = 1000;
+/// Tags of a job or a worker, at most.
+pub(super) const TAGS_MAX: usize = 64;
 /// Longest idempotency key.
 const KEY_MAX: usize = 255;
 /// Width over height where a camera does not say.
@@ -56,6 +60,17 @@ impl Farm {
         resolve(request, &contents, &self.rules).map_err(FarmError::Request)
     }
 
+    /// An error where the owner has as many jobs under way as one may have.
+    fn has_room_for(&self, owner: Option<&str>) -> Result<()> {
+        let most = self.rules.jobs_per_token;
+        let its =
+            |owner| self.lives().iter().filter(|live| live.spec.owner.as_deref() == Some(owner)).count();
+        match owner {
+            Some(owner) if its(owner) >= most => Err(FarmError::TooManyJobs { most }),
+            _ => Ok(()),
+        }
+    }
+
     async fn upload_at(&self, pointer: &str, id: &BlobId) -> Result<SceneReport> {
         let row = self.store.scene(id).await?;
         row.map(|row| row.report).ok_or_else(|| {
@@ -64,16 +79,26 @@ impl Farm {
         })
     }
 
-    /// Takes a job. The same request under the same key is taken once.
-    pub async fn submit(self: &Arc<Self>, request: JobRequest, key: Option<String>) -> Result<JobStatus> {
+    /// Takes a job of `owner`, a token's id. The same request of one owner under the same key is taken once.
+    pub async fn submit(
+        self: &Arc<Self>,
+        request: JobRequest,
+        key: Option<String>,
+        owner: Option<String>,
+    ) -> Result<JobStatus> {
         if key.as_ref().is_some_and(|key| key.is_empty() || key.len() > KEY_MAX) {
             let detail = format!("the idempotency key has 1 to {KEY_MAX} bytes");
             return Err(FarmError::Request(vec![fault("", detail)]));
         }
         let asked = serde_json::to_vec(&request).map_err(|e| FarmError::Damaged(e.to_string()))?;
-        let key =
-            key.map(|key| IdempotencyKey { key, fingerprint: blake3::hash(&asked).to_hex().to_string() });
-        let spec = self.check(request).await?;
+        let key = key.map(|key| IdempotencyKey {
+            key: format!("{}/{key}", owner.as_deref().unwrap_or_default()),
+            fingerprint: blake3::hash(&asked).to_hex().to_string(),
+        });
+        self.need_room()?;
+        let mut spec = self.check(request).await?;
+        self.has_room_for(owner.as_deref())?;
+        spec.owner = owner;
         let id = self.ids.job();
         let scene = spec.request.scene.clone().expect("checked: a scene is there");
         let new = NewJob {
@@ -170,6 +195,8 @@ pub fn resolve(
         samples: samples / replicates,
         error_target: request.error,
         seconds: request.seconds,
+        build: rules.build.to_owned(),
+        owner: None,
         method_reason: chosen.reason.to_owned(),
         unreachable,
         warnings,
@@ -211,8 +238,34 @@ fn numbers(request: &JobRequest, note: &mut impl FnMut(&str, String)) {
             "the shutter opens and closes at finite seconds, and not before it opens".to_owned(),
         );
     }
-    if request.name.as_ref().is_some_and(|name| name.is_empty() || name.len() > NAME_MAX) {
-        note("/name", format!("a name has 1 to {NAME_MAX} bytes"));
+    if let Some(fault) = request.name.as_ref().and_then(|name| bad_text(name)) {
+        note("/name", fault);
+    }
+    sharing(request, note);
+}
+
+/// What is wrong with a text for people.
+pub(super) fn bad_text(text: &str) -> Option<String> {
+    if text.is_empty() || text.len() > NAME_MAX {
+        return Some(format!("a name has 1 to {NAME_MAX} bytes"));
+    }
+    text.chars().any(char::is_control).then(|| "a name has no control characters".to_owned())
+}
+
+fn sharing(request: &JobRequest, note: &mut impl FnMut(&str, String)) {
+    if request.weight.is_some_and(|n| n == 0 || n > WEIGHT_MAX) {
+        note("/weight", format!("a weight is 1 to {WEIGHT_MAX}"));
+    }
+    if request.max_workers == Some(0) {
+        note("/max_workers", "a job needs 1 worker or more: pause it instead".to_owned());
+    }
+    if request.tags.len() > TAGS_MAX {
+        note("/tags", format!("there are more than {TAGS_MAX} tags"));
+    }
+    for (i, tag) in request.tags.iter().enumerate() {
+        if let Some(fault) = bad_text(tag) {
+            note(&format!("/tags/{i}"), fault);
+        }
     }
 }
 
@@ -320,7 +373,7 @@ fn warnings(
     warnings
 }
 
-fn fits(spec: &JobSpec, rules: &Rules) -> std::result::Result<(), Vec<Fault>> {
+pub(super) fn fits(spec: &JobSpec, rules: &Rules) -> std::result::Result<(), Vec<Fault>> {
     let Region { width, height, .. } = spec.region;
     let planes = spec.settings.planes();
     let (needs, has) = (spec.sums_bytes(), rules.sums_bytes);

@@ -2,7 +2,12 @@
 
 pub(crate) mod bench;
 mod ending;
+mod extending;
 mod faults;
 mod layers;
 mod merging;
+mod replicas;
+mod sharing;
+mod space;
 mod submitting;
+mod trust;

@@ -11,6 +11,17 @@ pub enum StoreError {
     /// The tables could not be brought up to date.
     #[error("the database cannot be used by this version of the program: {0}")]
     Migration(#[from] sqlx::migrate::MigrateError),
+    /// The tables are those of a later version.
+    #[error(
+        "the database has the tables of a later version of this program (migration {version}): use that one"
+    )]
+    Newer {
+        /// The migration that is not known.
+        version: i64,
+    },
+    /// Another farm appends to the job's sums.
+    #[error("another server has taken over the job's sums")]
+    Superseded,
     /// A group of changes could not be made durable; nothing of it was changed.
     #[error("the database could not write: {0}")]
     Commit(String),

@@ -4,7 +4,7 @@
 
 pub mod error;
 pub mod row;
-pub mod sqlite;
+pub mod sql;
 
 #[cfg(test)]
 pub mod contract;
@@ -18,15 +18,28 @@ use ovtigre_proto::{
     status::WorkerState,
 };
 use row::{
-    Added, Claim, CommitOutcome, CommitRow, Counts, IdempotencyKey, JobChange, JobFilter, JobRow, Lane,
-    Ledger, NewCheckpoint, NewCommit, NewJob, Released, SceneRow, WorkerRow,
+    Added, BatchKey, Brought, Claim, CommitOutcome, CommitRow, Counts, Extension, IdempotencyKey, JobChange,
+    JobFilter, JobHead, JobRow, Lane, Ledger, Mandate, NewCheckpoint, NewCommit, NewJob, Progress, Released,
+    SceneRow, TokenRow, Unclaimed, WorkerRow,
 };
 use std::{fmt, ops::Range, time::Duration};
+
+/// Whether several farms may have the same memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sharing {
+    /// Only this one.
+    Alone,
+    /// Any number.
+    WithOthers,
+}
 
 /// The farm's memory. Each call is one transaction: durable when it returns, without effect when
 /// it fails. Leases, pauses and losses are measured by the store's own clock.
 #[async_trait::async_trait]
 pub trait Store: Send + Sync + fmt::Debug {
+    /// Whether several farms may have it.
+    fn sharing(&self) -> Sharing;
+
     /// Remembers an uploaded file; again changes nothing.
     async fn add_scene(&self, report: SceneReport) -> Result<()>;
     /// An uploaded file.
@@ -40,14 +53,21 @@ pub trait Store: Send + Sync + fmt::Debug {
     async fn jobs(&self, filter: JobFilter) -> Result<Vec<JobRow>>;
     /// Jobs that are not over, or whose files do not have their last form, the oldest first.
     async fn unsettled_jobs(&self) -> Result<Vec<JobRow>>;
+    /// What changes most of those jobs.
+    async fn heads(&self) -> Result<Vec<JobHead>>;
     /// Changes a job that still has `version`, and counts it up; false where it has not. A job that
-    /// is over loses its cursors, leases and failures; pauses are taken off its run time.
+    /// is over loses its cursors, leases and failures, one that is settled its commits too; pauses are
+    /// taken off its run time.
     async fn change_job(&self, id: &JobId, version: u64, change: JobChange) -> Result<bool>;
     /// Forgets a job and all of it; false where there was none.
     async fn remove_job(&self, id: &JobId) -> Result<bool>;
 
     /// What a job's work looks like.
     async fn ledger(&self, job: &JobId) -> Result<Ledger>;
+    /// What of a job can be handed out.
+    async fn unclaimed(&self, job: &JobId) -> Result<Unclaimed>;
+    /// Batches of all jobs that came back and were not handed out again.
+    async fn returned(&self) -> Result<Vec<(JobId, BatchKey)>>;
     /// Hands out each batch that is the next of its lane or was returned, of a job that is queued
     /// or running, for `time`; says which. A queued job runs from its first batch on.
     async fn claim(&self, claims: Vec<Claim>, time: Duration) -> Result<Vec<bool>>;
@@ -62,10 +82,22 @@ pub trait Store: Send + Sync + fmt::Debug {
     async fn commit(&self, commit: NewCommit) -> Result<CommitOutcome>;
     /// What was brought of some blocks of a lane.
     async fn commits(&self, job: &JobId, lane: Lane, blocks: Range<u32>) -> Result<Vec<CommitRow>>;
+    /// What was brought of a job after the `after`-th, in the order of coming.
+    async fn commits_after(&self, job: &JobId, after: u64) -> Result<Brought>;
+
+    /// Gives `holder` the right to append to a job's sums for `time`; `None` where another has it, or the
+    /// job is settled. A mandate that was given before ends.
+    async fn take_merge(&self, job: &JobId, holder: &str, time: Duration) -> Result<Option<Mandate>>;
+    /// Gives `holder` `time` from now for each of its mandates; says which those are.
+    async fn keep_merges(&self, holder: &str, time: Duration) -> Result<Vec<(JobId, Mandate)>>;
+    /// Ends all mandates of `holder`.
+    async fn leave_merges(&self, holder: &str) -> Result<()>;
+    /// Writes down how far a job's picture is. An error without the mandate, as are the next two.
+    async fn publish(&self, job: &JobId, mandate: Mandate, progress: Progress) -> Result<()>;
     /// Remembers that the first `blocks` blocks of a lane are kept as one blob.
-    async fn set_snapshot(&self, job: &JobId, lane: Lane, blocks: u32) -> Result<()>;
+    async fn set_snapshot(&self, job: &JobId, mandate: Mandate, lane: Lane, blocks: u32) -> Result<()>;
     /// Adds a checkpoint; again changes nothing.
-    async fn add_checkpoint(&self, job: &JobId, checkpoint: NewCheckpoint) -> Result<()>;
+    async fn add_checkpoint(&self, job: &JobId, mandate: Mandate, checkpoint: NewCheckpoint) -> Result<()>;
     /// The layers' errors at a job's latest checkpoint; nothing before the first.
     async fn layers(&self, job: &JobId) -> Result<Vec<LayerError>>;
     /// A job's checkpoints in order.
@@ -73,8 +105,8 @@ pub trait Store: Send + Sync + fmt::Debug {
 
     /// A worker joins.
     async fn add_worker(&self, id: &WorkerId, join: WorkerJoin) -> Result<()>;
-    /// A worker is heard of, and stands so from now on; false where there is none.
-    async fn see_worker(&self, id: &WorkerId, state: WorkerState) -> Result<bool>;
+    /// A worker is heard of, and stands so from now on, unless it was told to leave; says how it stands.
+    async fn see_worker(&self, id: &WorkerId, state: WorkerState) -> Result<Option<WorkerState>>;
     /// A worker stands so from now on; false where there is none.
     async fn set_worker_state(&self, id: &WorkerId, state: WorkerState) -> Result<bool>;
     /// A worker.
@@ -85,6 +117,31 @@ pub trait Store: Send + Sync + fmt::Debug {
     async fn lose_workers(&self, time: Duration) -> Result<Vec<WorkerId>>;
     /// Workers that hold a batch of the job.
     async fn workers_of(&self, job: &JobId) -> Result<u32>;
+
+    /// Forgets what was brought of `batches`, which are handed out again unless the job is over, and that
+    /// `lanes` are kept as one blob.
+    async fn uncommit(&self, job: &JobId, batches: Vec<BatchKey>, lanes: Vec<Lane>) -> Result<()>;
+    /// Whoever appends to the job's sums has to read them again: what was brought has changed.
+    async fn free_merge(&self, job: &JobId) -> Result<()>;
+    /// Batches that a worker brought of jobs that are not over.
+    async fn commits_by(&self, worker: &WorkerId) -> Result<Vec<(JobId, BatchKey)>>;
+    /// Pins a job to a class of processors unless it is pinned; says to which it is.
+    async fn pin_job(&self, id: &JobId, class: &str) -> Result<Option<String>>;
+    /// Gives a job that still has `version` another specification, and counts it up; false where it has
+    /// not. One that is over goes on at what is kept of each lane as a blob; what was brought or handed out
+    /// past the blocks that both specifications have is forgotten.
+    async fn extend_job(&self, id: &JobId, version: u64, to: Extension) -> Result<bool>;
+    /// A worker gets no more batches, and why; false where there is none.
+    async fn set_aside(&self, worker: &WorkerId, reason: &str) -> Result<bool>;
+
+    /// Adds a token.
+    async fn add_token(&self, token: TokenRow) -> Result<()>;
+    /// All tokens, the oldest first.
+    async fn tokens(&self) -> Result<Vec<TokenRow>>;
+    /// The token whose hash that is.
+    async fn token(&self, hash: &BlobId) -> Result<Option<TokenRow>>;
+    /// Forgets a token; false where there was none.
+    async fn remove_token(&self, id: &str) -> Result<bool>;
 
     /// Forgets idempotency keys older than `age`.
     async fn forget_keys(&self, age: Duration) -> Result<()>;

@@ -143,7 +143,32 @@ pub struct JobRow {
     pub manifest: Option<String>,
     /// Whether it is over and its files have their last form.
     pub settled: bool,
+    /// The class of processors whose bits its sums have, once its first batch was handed out.
+    pub class: Option<String>,
 }
+
+/// What changes most of a job that is not settled.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JobHead {
+    /// Its name on the farm.
+    pub id: JobId,
+    /// Changes with every change of state, reason or priority.
+    pub version: u64,
+    /// Where it is in its life.
+    pub state: JobState,
+    /// Batches that were brought.
+    pub brought: u64,
+    /// Checkpoints taken.
+    pub looks: u32,
+    /// Whether nobody has the right to append to its sums now.
+    pub free: bool,
+    /// How far the picture is.
+    pub progress: Progress,
+}
+
+/// The right to append to a job's sums: counted up when it is given to somebody else.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Mandate(pub u64);
 
 /// What is in a picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -187,6 +212,8 @@ pub struct JobChange {
 /// The last form of a job that is over.
 #[derive(Clone, Debug)]
 pub struct Settlement {
+    /// Of whom settles it.
+    pub mandate: Mandate,
     /// What is in the picture that is kept.
     pub progress: Progress,
     /// The set of batches in it; `None` where there is no picture.
@@ -210,6 +237,26 @@ pub struct Ledger {
     pub snapshots: Vec<(Lane, u32)>,
     /// Checkpoints taken.
     pub checkpoints: u32,
+    /// How many were brought, of which some may be in the blobs of sums.
+    pub brought: u64,
+}
+
+/// What of a job can be handed out.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Unclaimed {
+    /// The next block of each lane.
+    pub cursors: Vec<(Lane, u32)>,
+    /// Blocks behind the cursors that nobody holds and nobody brought.
+    pub returned: Vec<BatchKey>,
+}
+
+/// What was brought of a job since some time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Brought {
+    /// Which.
+    pub rows: Vec<CommitRow>,
+    /// How many were brought by then, since the job began.
+    pub count: u64,
 }
 
 /// A batch to hand out.
@@ -318,6 +365,8 @@ pub struct WorkerRow {
     pub failures: u64,
     /// Rays a second, over its last batch.
     pub rays_per_second: f64,
+    /// Why it was put aside.
+    pub reason: Option<String>,
 }
 
 /// A checkpoint, and how far the picture is at it.
@@ -331,6 +380,73 @@ pub struct NewCheckpoint {
     pub layers: Vec<LayerError>,
     /// What is in the picture.
     pub progress: Progress,
+}
+
+/// Another specification of a job.
+#[derive(Clone, Debug)]
+pub struct Extension {
+    /// The farm's own document.
+    pub spec: String,
+    /// Leading blocks that both specifications have.
+    pub whole: u32,
+    /// Leading checkpoints that both have and that stay.
+    pub looks: u32,
+    /// Number of regions.
+    pub regions: u32,
+    /// Number of sequences of samples a region.
+    pub replicates: u32,
+}
+
+/// Who may call. The token itself is not kept.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TokenRow {
+    /// Its name on the farm.
+    pub id: String,
+    /// A name for people.
+    pub name: String,
+    /// What it may do.
+    pub role: Role,
+    /// Hash of the token.
+    pub hash: BlobId,
+    /// When it was made; `None` before it is kept.
+    pub created_at: Option<Timestamp>,
+}
+
+/// What a caller may do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Role {
+    /// All of it.
+    Admin,
+    /// To submit jobs, to change them, and all that `Read` may.
+    Submit,
+    /// To look.
+    Read,
+    /// To join as a worker, and to work.
+    Work,
+}
+
+impl Role {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Admin, Self::Submit, Self::Read, Self::Work];
+
+    /// As it is written.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Admin => "admin",
+            Self::Submit => "submit",
+            Self::Read => "read",
+            Self::Work => "work",
+        }
+    }
+}
+
+impl std::str::FromStr for Role {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        let found = Self::ALL.into_iter().find(|role| role.name() == text);
+        found.ok_or_else(|| format!("'{text}' is no role: there are admin, submit, read and work"))
+    }
 }
 
 /// Numbers for gauges.

@@ -108,6 +108,7 @@ fn layers_reflect_what_they_take() {
                     sheen_roughness: roughness,
                     through: 1.0 - coat,
                     through_color: Rgb::ONE,
+                    dispersion: 0.0,
                 };
                 let bsdf = rough(alpha, SurfaceParameters { layers: Some(layers), ..base });
                 for angle in [0.5, 50.0, 77.0, 88.5] {

@@ -45,6 +45,7 @@ fn values_are_finite_and_not_negative() {
         sheen_roughness: 0.0,
         through: 0.5,
         through_color: Rgb::ONE,
+        dispersion: 0.3,
     };
     for surface in [METAL, SOLID] {
         for (coat_roughness, sheen_roughness) in [(0.0, 0.0), (0.04, 0.3), (1.0, 1.0), (f32::NAN, f32::NAN)] {

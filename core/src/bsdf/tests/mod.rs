@@ -32,6 +32,17 @@ pub(crate) const METAL: SurfaceParameters = SurfaceParameters { metallic: 1.0, .
 pub(crate) const SHEET: SurfaceParameters = SurfaceParameters { transmission: 1.0, ..PLASTIC };
 pub(crate) const SOLID: SurfaceParameters = SurfaceParameters { walls: Walls::Solid, ..SHEET };
 
+pub(crate) const NO_LAYERS: Layers = Layers {
+    coat: 0.0,
+    coat_roughness: 0.0,
+    coat_normal: Vec3::Z,
+    sheen: Rgb::ZERO,
+    sheen_roughness: 0.0,
+    through: 0.0,
+    through_color: Rgb::ONE,
+    dispersion: 0.0,
+};
+
 /// With a roughness such that α is `alpha`.
 pub(crate) fn rough(alpha: f32, surface: SurfaceParameters) -> Bsdf {
     Bsdf::from_surface(&SurfaceParameters { roughness: alpha.sqrt().next_up(), ..surface })
@@ -99,6 +110,7 @@ impl Uniform {
             sheen_roughness: self.next(),
             through: some(self.next()),
             through_color: Rgb::new(self.next(), self.next(), self.next()),
+            dispersion: 0.0,
         };
         SurfaceParameters { layers: Some(layers), ..self.surface() }
     }

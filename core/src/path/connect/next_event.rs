@@ -13,7 +13,6 @@ use crate::path::tally::{Receiver, Tally};
 use crate::path::throughput::Throughput;
 use crate::path::vertex::{Vertex, Weight};
 use crate::path::walk::Walk;
-use crate::sampler::Use;
 use crate::scene::emission::EmissionDensity;
 use crate::scene::light::{FoundBy, NextEvent, ShadowEnd};
 use crate::settings::Shadows;
@@ -30,8 +29,7 @@ pub fn next_event<S: Throughput<EyeState>, L: Throughput<LightState>>(
         return;
     }
     let (scene, rules) = (walk.scene, walk.rules);
-    let choice = walk.sampler.pair(walk.dimension(Use::Light)).x;
-    let place = walk.sampler.pair(walk.dimension(Use::LightPoint));
+    let (choice, place) = (walk.numbers.light(), walk.numbers.light_point());
     let (point, moment) = (vertex.at.position, vertex.at.moment);
     let sampled = scene.lights.sample(&scene.data, scene.environment.as_ref(), moment, point, choice, place);
     let Some((light, event)) = sampled else { return };

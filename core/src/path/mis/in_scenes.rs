@@ -72,7 +72,7 @@ fn surfaces<'a>(
     loop {
         let hit = scene.closest(&ray, || 0)?;
         let at = scene.data.interaction(hit.instance, hit.triangle, hit.barycentric, NOW);
-        let vertex = Vertex::new(at, -ray.direction, rules.letters)?;
+        let vertex = Vertex::new(at, -ray.direction, rules)?;
         let next = vertex.sample(numbers.one(), numbers.pair(), Transport::Radiance)?;
         if all.len() + 1 >= most && vertex.is_smooth() {
             all.push((at, false));
@@ -129,7 +129,7 @@ fn path<'a>(scene: &'a Scene, rules: &Rules, most: usize, numbers: &mut Numbers)
 /// Whether a vertex scatters this way at all, seen from both sides.
 fn path_goes(v: &Point<'_>, rules: &Rules) -> bool {
     v.to.into_iter().zip([v.to[1], v.to[0]]).all(|(back, direction)| {
-        Vertex::new(v.at, back, rules.letters)
+        Vertex::new(v.at, back, rules)
             .is_some_and(|vertex| vertex.evaluate(direction, Transport::Radiance).1 > 0.0)
     })
 }
@@ -202,7 +202,7 @@ impl<'a> Path<'a> {
         for v in &self.vertices {
             walk.arrive(&v.at);
             visitor.arrives(&mut walk, &v.at, (0, 0), tally);
-            let vertex = Vertex::new(v.at, v.to[0], rules.letters)?;
+            let vertex = Vertex::new(v.at, v.to[0], rules)?;
             light.push((walk.clone(), vertex.clone()));
             let next = continuation(&vertex, v, v.to[1], Transport::Importance);
             walk.scatterings += 1;
@@ -213,7 +213,7 @@ impl<'a> Path<'a> {
         let mut eye = Vec::new();
         for v in self.vertices.iter().rev() {
             walk.arrive(&v.at);
-            let vertex = Vertex::new(v.at, v.to[1], rules.letters)?;
+            let vertex = Vertex::new(v.at, v.to[1], rules)?;
             eye.push((walk.clone(), vertex.clone()));
             let next = continuation(&vertex, v, v.to[0], Transport::Radiance);
             walk.scatterings += 1;

@@ -3,7 +3,7 @@
 use crate::{
     blobs::Blobs,
     farm::{Farm, picture::ExrFile, rules::Rules, scene::Inspect},
-    store::sqlite::Sqlite,
+    store::sql::Sql,
 };
 use bytes::Bytes;
 use ovtigre_core::film::{
@@ -19,7 +19,7 @@ use ovtigre_proto::{
     scene::{SceneContent, SceneContents},
     status::{JobState, JobStatus},
 };
-use std::{sync::Arc, time::Duration};
+use std::{path::Path, sync::Arc, time::Duration};
 use tempfile::TempDir;
 
 /// Spread of the made-up samples around 1.
@@ -42,13 +42,17 @@ pub(crate) struct Bench {
 
 /// Fast enough for tests, else as always.
 pub(crate) fn rules() -> Rules {
-    Rules { tick: Duration::from_millis(10), rest: Duration::ZERO, ..Rules::default() }
+    Rules { tick: Duration::from_millis(10), rest: Duration::ZERO, kept_sums_bytes: 0, ..Rules::default() }
 }
 
 async fn open(folder: &TempDir, rules: Rules) -> Arc<Farm> {
-    let store = Arc::new(Sqlite::open(&folder.path().join("farm.sqlite")).await.unwrap());
+    let store = Arc::new(Sql::file(&folder.path().join("farm.sqlite")).await.unwrap());
     let blobs = Blobs::folder(&folder.path().join("blobs")).unwrap();
-    let inspect = Inspect::new(|bytes| {
+    Farm::open(store, blobs, inspect(), rules).await.unwrap()
+}
+
+fn inspect() -> Inspect {
+    Inspect::new(|bytes| {
         if bytes.starts_with(b"bad") {
             return Err(crate::farm::error::fault("/meshes/0", "the mesh is bad"));
         }
@@ -58,21 +62,34 @@ async fn open(folder: &TempDir, rules: Rules) -> Arc<Farm> {
         let cameras = vec!["front".to_owned(), "side".to_owned()];
         let camera_aspect_ratios = vec![Some(2.0), None];
         Ok(SceneContent::Scene(SceneContents { cameras, camera_aspect_ratios, ..SceneContents::default() }))
-    });
-    Farm::open(store, blobs, inspect, rules).await.unwrap()
+    })
 }
 
 impl Bench {
     pub(crate) async fn new(rules: Rules) -> Self {
         let folder = tempfile::tempdir().unwrap();
-        Self { farm: open(&folder, rules).await, rules, folder }
+        Self { farm: open(&folder, rules.clone()).await, rules, folder }
+    }
+
+    /// One of several farms over a database and a folder.
+    pub(crate) async fn replica(database: &str, folder: &Path, rules: Rules) -> Self {
+        let store = Arc::new(Sql::server(database).await.unwrap());
+        let blobs = Blobs::folder(folder).unwrap();
+        let farm = Farm::open(store, blobs, inspect(), rules.clone()).await.unwrap();
+        Self { farm, rules, folder: tempfile::tempdir().unwrap() }
+    }
+
+    /// As if the process was killed: nothing is waited for, and nothing given up.
+    pub(crate) async fn die(self) {
+        self.farm.stopping.cancel();
+        self.farm.store.close().await;
     }
 
     /// As after the process was killed: nothing is waited for.
     pub(crate) async fn crash(self) -> Self {
         self.farm.stopping.cancel();
         self.farm.store.close().await;
-        let farm = open(&self.folder, self.rules).await;
+        let farm = open(&self.folder, self.rules.clone()).await;
         Self { farm, ..self }
     }
 
@@ -95,17 +112,22 @@ impl Bench {
             ..JobRequest::default()
         };
         change(&mut request);
-        self.farm.submit(request, None).await.unwrap().id
+        self.farm.submit(request, None, None).await.unwrap().id
     }
 
     pub(crate) async fn worker(&self) -> WorkerId {
-        let join = WorkerJoin {
+        self.worker_as(|_| ()).await
+    }
+
+    pub(crate) async fn worker_as(&self, change: impl FnOnce(&mut WorkerJoin)) -> WorkerId {
+        let mut join = WorkerJoin {
             name: "test".to_owned(),
             threads: 1,
-            build: "0".to_owned(),
+            build: env!("CARGO_PKG_VERSION").to_owned(),
             instruction_set: "any".to_owned(),
             tags: Vec::new(),
         };
+        change(&mut join);
         self.farm.join(join).await.unwrap().id
     }
 
@@ -186,21 +208,30 @@ impl Bench {
         layers.channels.into_iter().map(|(name, values)| (name, bits(values))).collect()
     }
 
-    /// Files under `jobs/`, by the end of their names.
-    pub(crate) fn files(&self, job: &JobId) -> Vec<String> {
+    /// Asserts that nothing is kept of the job but its picture.
+    pub(crate) fn assert_only_a_picture(&self, job: &JobId) {
+        let files = self.files(job);
+        assert!(files.len() == 1 && files[0].starts_with("result-"), "{files:?}");
+    }
+
+    /// Files under `jobs/`.
+    pub(crate) fn paths(&self, job: &JobId) -> Vec<std::path::PathBuf> {
         let mut folders = vec![self.folder.path().join("blobs/jobs").join(job.as_str())];
         let mut files = Vec::new();
         while let Some(folder) = folders.pop() {
             for entry in std::fs::read_dir(folder).into_iter().flatten() {
                 let path = entry.unwrap().path();
-                if path.is_dir() {
-                    folders.push(path);
-                } else {
-                    files.push(path.file_name().unwrap().to_str().unwrap().to_owned());
-                }
+                if path.is_dir() { folders.push(path) } else { files.push(path) }
             }
         }
+        files.sort();
         files
+    }
+
+    /// Files under `jobs/`, by the end of their names.
+    pub(crate) fn files(&self, job: &JobId) -> Vec<String> {
+        let name = |path: &std::path::PathBuf| path.file_name().unwrap().to_str().unwrap().to_owned();
+        self.paths(job).iter().map(name).collect()
     }
 }
 

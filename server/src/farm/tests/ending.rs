@@ -89,7 +89,7 @@ async fn a_cancelled_job_keeps_its_picture_and_takes_no_more() {
     bench.farm.cancel(&job).await.unwrap();
     let bench = bench.crash().await;
     assert_eq!(bench.pixels(&job).await, before);
-    assert_eq!(bench.files(&job), ["result.exr"]);
+    bench.assert_only_a_picture(&job);
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -98,7 +98,7 @@ async fn a_job_cancelled_before_its_first_batch_has_no_picture() {
     let job = bench.job(100, |_| ()).await;
     bench.farm.cancel(&job).await.unwrap();
     bench.until_settled(&job, JobState::Cancelled).await;
-    assert!(matches!(bench.farm.exr(&job).await, Err(crate::farm::error::FarmError::NoPicture(_))));
+    assert!(matches!(bench.farm.exr(&job).await, Err(crate::farm::error::FarmError::NeverPicture(_))));
 }
 
 #[tokio::test(flavor = "multi_thread")]

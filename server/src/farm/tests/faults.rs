@@ -82,15 +82,96 @@ async fn a_worker_is_drained_leaves_and_is_gone() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_job_that_cannot_be_rendered_fails_at_once_with_the_reason() {
+async fn a_job_that_cannot_be_rendered_fails_after_three_tries_with_the_workers_reason() {
     let bench = Bench::new(rules()).await;
     let job = bench.job(1000, |_| ()).await;
     let worker = bench.worker().await;
-    let lease = bench.take(&worker, 1).await.remove(0);
     let failure = LeaseFailure { reason: "no camera 7".to_owned(), kind: FailureKind::Job };
-    bench.farm.give_back(&lease.id, failure).await.unwrap();
+    for n in 1..=3 {
+        assert!(!bench.farm.status(&job).await.unwrap().state.is_over(), "before {n}");
+        let lease = bench.take(&worker, 1).await.remove(0);
+        bench.farm.give_back(&lease.id, failure.clone()).await.unwrap();
+    }
     let status = bench.until_settled(&job, JobState::Failed).await;
     assert_eq!(status.reason.as_deref(), Some("no camera 7"));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn one_worker_alone_among_several_fails_no_job() {
+    let bench = Bench::new(rules()).await;
+    let job = bench.job(1000, |_| ()).await;
+    let (bad, good) = (bench.worker().await, bench.worker().await);
+    let failure = LeaseFailure { reason: "what I cannot read".to_owned(), kind: FailureKind::Job };
+    let mut seen = std::collections::BTreeSet::new();
+    for _ in 0..20 {
+        for lease in bench.take(&bad, 1).await {
+            assert!(seen.insert(format!("{:?}", lease.batch)), "a batch comes back to who failed at it");
+            bench.farm.give_back(&lease.id, failure.clone()).await.unwrap();
+        }
+    }
+    assert!(!seen.is_empty() && !bench.farm.status(&job).await.unwrap().state.is_over());
+    bench.work(&good, Spread::Noisy).await;
+    bench.until_settled(&job, JobState::Done).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_batch_that_fails_on_three_workers_fails_its_job() {
+    let bench = Bench::new(rules()).await;
+    let job = bench.job(1000, |_| ()).await;
+    let workers = [bench.worker().await, bench.worker().await, bench.worker().await, bench.worker().await];
+    let failure = LeaseFailure { reason: "no such mesh".to_owned(), kind: FailureKind::Job };
+    let mut batches = std::collections::BTreeSet::new();
+    for worker in &workers[..3] {
+        assert!(!bench.farm.status(&job).await.unwrap().state.is_over());
+        let lease = bench.take(worker, 1).await.remove(0);
+        batches.insert(format!("{:?}", lease.batch));
+        bench.farm.give_back(&lease.id, failure.clone()).await.unwrap();
+    }
+    assert_eq!(batches.len(), 1, "it goes to another at once");
+    let status = bench.until_settled(&job, JobState::Failed).await;
+    assert_eq!(status.reason.as_deref(), Some("no such mesh"));
+    assert_eq!(bench.farm.worker(&workers[0]).await.unwrap().state, WorkerState::Active, "not their fault");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_worker_that_fails_at_several_jobs_is_put_aside_and_bad_jobs_put_nobody_aside() {
+    let bench = Bench::new(rules()).await;
+    let (bad, good) = (bench.worker().await, bench.worker().await);
+    let failure = |kind| LeaseFailure { reason: "no memory".to_owned(), kind };
+    let mut jobs = Vec::new();
+    for n in 0..3 {
+        jobs.push(bench.job(1000, |r| r.priority = Some(n)).await);
+        let held = bench.take(&bad, 2).await;
+        bench.farm.give_back(&held[0].id, failure(FailureKind::Worker)).await.unwrap();
+        if n < 2 {
+            bench.farm.give_back(&held[1].id, failure(FailureKind::HandedBack)).await.unwrap();
+        }
+    }
+    let status = bench.farm.worker(&bad).await.unwrap();
+    assert_eq!((status.state, status.leases), (WorkerState::Aside, 0));
+    assert!(status.reason.unwrap().contains("3 jobs"));
+    let reply = bench.farm.exchange(&bad, Exchange { wants: 4, ..Exchange::default() }).await.unwrap();
+    assert!(reply.leases.is_empty() && !reply.drain, "it stays, and gets nothing");
+    let bench = bench.crash().await;
+    assert!(bench.take(&bad, 4).await.is_empty(), "nor after a restart");
+    bench.work(&good, Spread::Noisy).await;
+    for job in &jobs {
+        bench.until_settled(job, JobState::Done).await;
+    }
+    // Jobs that nobody can render do not cost the farm its workers.
+    let third = bench.worker().await;
+    for _ in 0..4 {
+        let job = bench.job(1000, |_| ()).await;
+        for worker in [&good, &third, &good] {
+            for lease in bench.take(worker, 1).await {
+                bench.farm.give_back(&lease.id, failure(FailureKind::Job)).await.unwrap();
+            }
+        }
+        bench.farm.cancel(&job).await.unwrap();
+    }
+    for worker in [&good, &third] {
+        assert_eq!(bench.farm.worker(worker).await.unwrap().state, WorkerState::Active);
+    }
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -127,23 +208,76 @@ async fn jobs_of_one_priority_take_turns_and_a_higher_one_goes_first() {
     assert!(bench.take(&worker, 4).await.iter().all(|lease| lease.job == urgent));
 }
 
-#[tokio::test(flavor = "multi_thread")]
-async fn a_lost_sum_fails_its_job_with_the_reason() {
-    let bench = Bench::new(Rules { fresh_bytes: 0, ..rules() }).await;
-    let job = bench.job(1000, |_| ()).await;
-    let worker = bench.worker().await;
-    let leases = bench.take(&worker, 8).await;
-    // Past the checkpoint: it waits as a blob.
-    let early = leases.iter().find(|lease| lease.batch.block.index == 1).unwrap();
-    bench.bring(early, Spread::Noisy).await;
-    sleep(50).await;
-    let folder = crate::blobs::BlobFolder::Partials(job.clone());
-    bench.farm.blobs.delete_all(&folder).await.unwrap();
-    for lease in leases.iter().filter(|lease| lease.batch.block.index == 0) {
-        bench.bring(lease, Spread::Noisy).await;
+/// What becomes of a file.
+#[derive(Clone, Copy, Debug)]
+enum Harm {
+    Removed,
+    Cut,
+    OneBitFlipped,
+}
+
+impl Harm {
+    fn to(self, file: &std::path::Path) {
+        let mut bytes = std::fs::read(file).unwrap();
+        let middle = bytes.len() / 2;
+        match self {
+            Self::Removed => return std::fs::remove_file(file).unwrap(),
+            Self::Cut => bytes.truncate(middle),
+            Self::OneBitFlipped => bytes[middle] ^= 1,
+        }
+        std::fs::write(file, bytes).unwrap();
     }
-    let status = bench.until_settled(&job, JobState::Failed).await;
-    assert!(status.reason.unwrap().contains("is lost"));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn sums_that_are_lost_or_damaged_on_the_disk_are_rendered_again() {
+    let calm = Bench::new(rules()).await;
+    let job = calm.job(4000, |_| ()).await;
+    calm.work(&calm.worker().await, Spread::Noisy).await;
+    calm.until_settled(&job, JobState::Done).await;
+    let expected = calm.pixels(&job).await;
+    for harm in [Harm::Removed, Harm::Cut, Harm::OneBitFlipped] {
+        let mut bench = Bench::new(Rules { fresh_bytes: 0, partials_kept: 2, ..rules() }).await;
+        let job = bench.job(4000, |_| ()).await;
+        let mut harmed = 0;
+        for round in 0..6 {
+            let worker = bench.worker().await;
+            for lease in bench.take(&worker, 7).await {
+                bench.bring(&lease, Spread::Noisy).await;
+            }
+            sleep(30).await;
+            // Files of either kind: partials, and lanes as one blob.
+            let files = bench.paths(&job);
+            for file in files.iter().skip(round % 2).step_by(3) {
+                // A lane's sums have no check of their own but their length.
+                let partial = file.extension().is_some();
+                let harm = if partial { harm } else { Harm::Cut };
+                harm.to(file);
+                harmed += 1;
+            }
+            bench = bench.crash().await;
+        }
+        assert!(harmed > 6, "{harmed}");
+        let worker = bench.worker().await;
+        bench.work(&worker, Spread::Noisy).await;
+        let status = bench.until_settled(&job, JobState::Done).await;
+        assert_eq!(status.batches_done, status.batches_asked, "{harm:?}");
+        assert_eq!(bench.pixels(&job).await, expected, "{harm:?}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_refused_sum_is_a_failure_and_goes_to_another() {
+    let bench = Bench::new(rules()).await;
+    bench.job(1000, |_| ()).await;
+    let (bad, good) = (bench.worker().await, bench.worker().await);
+    let lease = bench.take(&bad, 1).await.remove(0);
+    let mut wrong = super::bench::sum(lease.batch, Spread::Noisy);
+    wrong.planes[0][0][0] = f32::NAN;
+    let refused = bench.bring_sum(&lease, &wrong).await.unwrap_err();
+    assert!(matches!(&refused, FarmError::Sum(_)), "{refused}");
+    assert_eq!(bench.farm.worker(&bad).await.unwrap().failures, 1);
+    assert_eq!(bench.take(&good, 1).await[0].batch, lease.batch);
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -51,6 +51,11 @@ async fn a_request_that_cannot_be_followed_is_refused_where_it_is_wrong() {
         ("/shutter", Box::new(|r| r.shutter = Some([0.5, 0.0]))),
         ("/shutter", Box::new(|r| r.shutter = Some([0.0, f64::INFINITY]))),
         ("/name", Box::new(|r| r.name = Some("x".repeat(1000)))),
+        ("/name", Box::new(|r| r.name = Some("a\u{7}".to_owned()))),
+        ("/layers/0", Box::new(|r| r.layers = vec!["a\u{1b}=LE".to_owned()])),
+        ("/weight", Box::new(|r| r.weight = Some(0))),
+        ("/max_workers", Box::new(|r| r.max_workers = Some(0))),
+        ("/tags/0", Box::new(|r| r.tags = vec![String::new()])),
     ];
     for (pointer, change) in cases {
         let mut request = JobRequest { scene: Some(scene.clone()), ..JobRequest::default() };
@@ -70,12 +75,12 @@ async fn the_same_request_under_the_same_key_is_one_job() {
     let bench = Bench::new(rules()).await;
     let request = JobRequest { scene: Some(bench.scene().await), ..JobRequest::default() };
     let key = || Some("k1".to_owned());
-    let first = bench.farm.submit(request.clone(), key()).await.unwrap();
-    let again = bench.farm.submit(request.clone(), key()).await.unwrap();
+    let first = bench.farm.submit(request.clone(), key(), None).await.unwrap();
+    let again = bench.farm.submit(request.clone(), key(), None).await.unwrap();
     assert_eq!(first.id, again.id);
     let other = JobRequest { seed: Some(1), ..request.clone() };
-    assert!(matches!(bench.farm.submit(other, key()).await, Err(FarmError::KeyTaken)));
-    assert_ne!(bench.farm.submit(request, Some("k2".to_owned())).await.unwrap().id, first.id);
+    assert!(matches!(bench.farm.submit(other, key(), None).await, Err(FarmError::KeyTaken)));
+    assert_ne!(bench.farm.submit(request, Some("k2".to_owned()), None).await.unwrap().id, first.id);
 }
 
 #[tokio::test]

@@ -1,9 +1,12 @@
 //! The one writer: whatever waits while a transaction is made durable goes into the next, together.
 
+use super::{connection::Db, open::Source, query::query};
 use crate::store::error::{Result, StoreError};
 use futures::future::BoxFuture;
-use sqlx::{Connection as _, SqliteConnection};
-use std::sync::{Mutex, PoisonError};
+use std::{
+    sync::{Mutex, PoisonError},
+    time::Duration,
+};
 use tokio::{
     sync::{mpsc, oneshot},
     task::JoinHandle,
@@ -11,11 +14,15 @@ use tokio::{
 
 /// Changes in one transaction, at most.
 const GROUP_MAX: usize = 256;
+/// A database that does not answer for so long is given up: the connection is made anew.
+const PATIENCE: Duration = Duration::from_secs(30);
+/// Wait between two attempts to reach the database again.
+const REST: Duration = Duration::from_millis(200);
 
 /// Tells the caller what became of its change, once it is durable or the group failed.
 type Tell = Box<dyn FnOnce(Result<()>) + Send>;
 /// A change: whether it is to be kept, and who is told.
-type Change = Box<dyn for<'c> FnOnce(&'c mut SqliteConnection) -> BoxFuture<'c, (Keep, Tell)> + Send>;
+type Change = Box<dyn for<'c> FnOnce(&'c mut Db) -> BoxFuture<'c, (Keep, Tell)> + Send>;
 
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Keep {
@@ -31,10 +38,10 @@ pub(super) struct Writer {
 }
 
 impl Writer {
-    /// Writes over `connection` until it is closed.
-    pub(super) fn start(connection: SqliteConnection) -> Self {
+    /// Writes over `connection`, or another of the same `source` where that breaks, until it is closed.
+    pub(super) fn start(connection: Db, source: Source) -> Self {
         let (changes, waiting) = mpsc::channel(4 * GROUP_MAX);
-        let task = tokio::spawn(write_all(connection, waiting));
+        let task = tokio::spawn(write_all(connection, source, waiting));
         Self { changes: Mutex::new(Some(changes)), task: Mutex::new(Some(task)) }
     }
 
@@ -42,7 +49,7 @@ impl Writer {
     pub(super) async fn write<T, F>(&self, change: F) -> Result<T>
     where
         T: Send + 'static,
-        F: for<'c> FnOnce(&'c mut SqliteConnection) -> BoxFuture<'c, Result<T>> + Send + 'static,
+        F: for<'c> FnOnce(&'c mut Db) -> BoxFuture<'c, Result<T>> + Send + 'static,
     {
         let (tell, told) = oneshot::channel();
         let change: Change = Box::new(move |connection| {
@@ -58,7 +65,7 @@ impl Writer {
         });
         let changes = self.changes.lock().unwrap_or_else(PoisonError::into_inner).clone();
         changes.ok_or(StoreError::Closed)?.send(change).await.map_err(|_| StoreError::Closed)?;
-        told.await.map_err(|_| StoreError::Closed)?
+        told.await.map_err(|_| StoreError::Commit("the group it was in was given up".to_owned()))?
     }
 
     /// Takes no more changes, waits for those under way, and closes the connection.
@@ -73,7 +80,8 @@ impl Writer {
     }
 }
 
-async fn write_all(mut connection: SqliteConnection, mut waiting: mpsc::Receiver<Change>) {
+async fn write_all(connection: Db, source: Source, mut waiting: mpsc::Receiver<Change>) {
+    let mut connection = Some(connection);
     while let Some(first) = waiting.recv().await {
         let mut group = vec![first];
         while group.len() < GROUP_MAX
@@ -81,21 +89,48 @@ async fn write_all(mut connection: SqliteConnection, mut waiting: mpsc::Receiver
         {
             group.push(next);
         }
-        write_group(&mut connection, group).await;
+        if connection.is_none() {
+            connection = match tokio::time::timeout(PATIENCE, source.connect()).await {
+                Ok(Ok(again)) => Some(again),
+                Ok(Err(error)) => {
+                    tracing::error!(%error, changes = group.len(), "the database cannot be reached");
+                    // Dropping the group tells its callers.
+                    drop(group);
+                    tokio::time::sleep(REST).await;
+                    continue;
+                }
+                Err(_) => continue,
+            };
+        }
+        let Some(db) = connection.as_mut() else { continue };
+        let written = tokio::time::timeout(PATIENCE, write_group(db, group)).await;
+        if !matches!(written, Ok(Health::Good)) {
+            connection = connection.take().filter(|_| source.is_file() && written.is_ok());
+        }
     }
-    if let Err(error) = connection.close().await {
+    if let Some(connection) = connection
+        && let Err(error) = connection.close().await
+    {
         tracing::warn!(%error, "the database did not close cleanly");
     }
 }
 
+/// Whether a connection can still be used.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Health {
+    Good,
+    Doubtful,
+}
+
 /// One transaction; a change that fails is taken back alone, by its savepoint.
-async fn write_group(connection: &mut SqliteConnection, group: Vec<Change>) {
+async fn write_group(connection: &mut Db, group: Vec<Change>) -> Health {
     let mut tells: Vec<Tell> = Vec::with_capacity(group.len());
-    let mut written = run(connection, "BEGIN IMMEDIATE").await;
-    if written.is_err() {
+    let mut written = connection.begin_group().await;
+    if let Err(error) = &written {
         // Outside a transaction a change would stand whatever its caller is told: none is tried.
-        tracing::error!("the database is locked by another program, or broken");
-        return;
+        tracing::error!(%error, "the database is locked by another program, or broken");
+        let _ = connection.execute(query("ROLLBACK")).await;
+        return Health::Doubtful;
     }
     for change in group {
         if written.is_err() {
@@ -108,10 +143,10 @@ async fn write_group(connection: &mut SqliteConnection, group: Vec<Change>) {
         let (keep, tell) = change(connection).await;
         tells.push(tell);
         if keep == Keep::No {
-            written = run(connection, "ROLLBACK TO change").await;
+            written = run(connection, "ROLLBACK TO SAVEPOINT change").await;
         }
         if written.is_ok() {
-            written = run(connection, "RELEASE change").await;
+            written = run(connection, "RELEASE SAVEPOINT change").await;
         }
     }
     if written.is_ok() {
@@ -120,13 +155,14 @@ async fn write_group(connection: &mut SqliteConnection, group: Vec<Change>) {
     if let Err(error) = &written {
         tracing::error!(%error, changes = tells.len(), "a group of changes was not written");
         // Fails where no transaction was begun or it is rolled back already.
-        let _ = run(connection, "ROLLBACK").await;
+        let _ = connection.execute(query("ROLLBACK")).await;
     }
     for tell in tells {
         tell(written.as_ref().map_or_else(|error| Err(StoreError::Commit(error.to_string())), |()| Ok(())));
     }
+    if written.is_ok() { Health::Good } else { Health::Doubtful }
 }
 
-async fn run(connection: &mut SqliteConnection, sql: &'static str) -> std::result::Result<(), sqlx::Error> {
-    sqlx::query(sql).execute(connection).await.map(|_| ())
+async fn run(connection: &mut Db, sql: &'static str) -> Result<()> {
+    connection.execute(query(sql)).await.map(drop)
 }

@@ -1,18 +1,14 @@
-//! Rows of SQLite to the store's own.
+//! Columns to the store's own words.
 
+use super::connection::Row;
 use crate::store::{
     error::{Result, StoreError},
-    row::{BatchKey, LeaseRow},
+    row::{BatchKey, CommitRow, LeaseRow},
 };
 use jiff::Timestamp;
 use ovtigre_proto::status::{JobState, WorkerState};
-use sqlx::{Row as _, SqliteConnection, sqlite::SqliteRow};
+use serde::{Serialize, de::DeserializeOwned};
 use std::{fmt::Display, str::FromStr, time::Duration};
-
-/// Milliseconds since 1970 by the database's clock.
-pub(super) async fn now(connection: &mut SqliteConnection) -> Result<i64> {
-    Ok(sqlx::query_scalar("SELECT CAST(unixepoch('subsec') * 1000 AS INTEGER)").fetch_one(connection).await?)
-}
 
 /// Whole milliseconds.
 pub(super) fn millis(time: Duration) -> i64 {
@@ -25,18 +21,28 @@ pub(super) fn time(millis: i64) -> Result<Timestamp> {
 }
 
 /// A text column as what it says.
-pub(super) fn parse<T: FromStr<Err: Display>>(row: &SqliteRow, column: &'static str) -> Result<T> {
-    row.try_get::<&str, _>(column)?.parse().map_err(|e: T::Err| StoreError::damaged(column, e))
+pub(super) fn parse<T: FromStr<Err: Display>>(row: &Row, column: &'static str) -> Result<T> {
+    row.text(column)?.parse().map_err(|e: T::Err| StoreError::damaged(column, e))
 }
 
 /// A whole number that is not negative.
-pub(super) fn count<T: TryFrom<i64>>(row: &SqliteRow, column: &'static str) -> Result<T> {
-    let number: i64 = row.try_get(column)?;
+pub(super) fn count<T: TryFrom<i64>>(row: &Row, column: &'static str) -> Result<T> {
+    let number = row.whole(column)?;
     T::try_from(number).map_err(|_| StoreError::damaged(column, number))
 }
 
+/// A document as text.
+pub(super) fn to_json(value: &impl Serialize) -> Result<String> {
+    serde_json::to_string(value).map_err(|e| StoreError::damaged("document", e))
+}
+
+/// A text column as the document it holds.
+pub(super) fn from_json<T: DeserializeOwned>(row: &Row, column: &'static str) -> Result<T> {
+    serde_json::from_str(&row.text(column)?).map_err(|e| StoreError::damaged(column, e))
+}
+
 /// Columns `block`, `replicate`, `region`.
-pub(super) fn batch(row: &SqliteRow) -> Result<BatchKey> {
+pub(super) fn batch(row: &Row) -> Result<BatchKey> {
     Ok(BatchKey {
         block: count(row, "block")?,
         replicate: count(row, "replicate")?,
@@ -45,12 +51,21 @@ pub(super) fn batch(row: &SqliteRow) -> Result<BatchKey> {
 }
 
 /// Columns of a lease.
-pub(super) fn lease(row: &SqliteRow) -> Result<LeaseRow> {
+pub(super) fn lease(row: &Row) -> Result<LeaseRow> {
     Ok(LeaseRow {
         id: parse(row, "id")?,
         job: parse(row, "job")?,
         batch: batch(row)?,
         worker: parse(row, "worker")?,
+    })
+}
+
+/// Columns of a batch that was brought.
+pub(super) fn commit(row: &Row) -> Result<CommitRow> {
+    Ok(CommitRow {
+        batch: batch(row)?,
+        hash: parse(row, "hash")?,
+        worker_micros: count(row, "worker_micros")?,
     })
 }
 
@@ -74,12 +89,19 @@ pub(super) fn worker_state_name(state: WorkerState) -> &'static str {
         WorkerState::Draining => "draining",
         WorkerState::Lost => "lost",
         WorkerState::Gone => "gone",
+        WorkerState::Aside => "aside",
     }
 }
 
 /// A worker's state by its name.
 pub(super) fn worker_state(text: &str) -> Result<WorkerState> {
-    let all = [WorkerState::Active, WorkerState::Draining, WorkerState::Lost, WorkerState::Gone];
+    let all = [
+        WorkerState::Active,
+        WorkerState::Draining,
+        WorkerState::Lost,
+        WorkerState::Gone,
+        WorkerState::Aside,
+    ];
     all.into_iter()
         .find(|s| worker_state_name(*s) == text)
         .ok_or_else(|| StoreError::damaged("worker state", text))

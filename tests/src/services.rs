@@ -1,0 +1,39 @@
+//! Services that farms are tested with, where `tests/services` has started them.
+
+use sqlx::{AssertSqlSafe, ConnectOptions as _, Connection as _, postgres::PgConnectOptions};
+use std::env;
+
+/// A place of its own for a test, on a PostgreSQL server and in a bucket: the flags of a farm there.
+#[derive(Clone, Debug)]
+pub struct Shared {
+    database: String,
+    blobs: String,
+}
+
+impl Shared {
+    /// For the test of that name; `None` where there are no such services, which is said.
+    pub fn place(name: &str) -> Option<Self> {
+        let (Ok(server), Ok(bucket)) = (env::var("OVTIGRE_TEST_POSTGRES"), env::var("OVTIGRE_TEST_BUCKET"))
+        else {
+            eprintln!("SKIPPED: {name} needs PostgreSQL and S3: start it with tests/services");
+            return None;
+        };
+        let name = format!("it_{}_{name}", std::process::id());
+        let runtime = tokio::runtime::Runtime::new().expect("threads");
+        runtime.block_on(async {
+            let options: PgConnectOptions = server.parse().expect("an address of PostgreSQL");
+            let mut connection = options.connect().await.expect("the server answers");
+            let create = AssertSqlSafe(format!("CREATE SCHEMA {name}"));
+            sqlx::query(create).execute(&mut connection).await.expect("a new name");
+            connection.close().await.expect("the server is there");
+        });
+        let mark = if server.contains('?') { '&' } else { '?' };
+        let database = format!("{server}{mark}options=-csearch_path%3D{name}");
+        Some(Self { database, blobs: format!("{bucket}/{name}") })
+    }
+
+    /// Flags of `ovtigre serve`.
+    pub fn flags(&self) -> [&str; 4] {
+        ["--database", &self.database, "--blobs", &self.blobs]
+    }
+}
