@@ -122,7 +122,7 @@ async fn a_picture_so_far_is_shown_by_those_who_do_not_append() {
     for lease in one.take(&worker, 9).await {
         one.bring(&lease, Spread::Noisy).await;
     }
-    let done = one.until(&job, |status| status.batches_done >= 8).await;
+    let done = one.until(&job, |status| status.batches_done == 9).await;
     other.until(&job, |status| status.batches_done == done.batches_done).await;
     let curve = one.farm.curve(&job).await.unwrap();
     assert_eq!(other.farm.curve(&job).await.unwrap().rows, curve.rows);
