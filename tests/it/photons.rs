@@ -65,6 +65,11 @@ fn on_coated_plastic_and_mixtures() {
 }
 
 #[test]
+fn on_coats_sheen_and_leaves() {
+    agree(&matrix::coats_cloth_and_leaves(), 2, 2);
+}
+
+#[test]
 fn from_a_point() {
     agree(&matrix::point(), 1, 2);
 }

@@ -68,6 +68,7 @@ const CAUSTIC_SECONDS: f64 = 6.0;
 
 /// A caustic by path, light, bidirectional and photon, each for the same time of the processor, whatever else it does. Says how
 /// long they took.
+#[expect(clippy::print_stderr, reason = "times belong beside the picture, and this is a program")]
 fn caustics() -> anyhow::Result<Sheet> {
     let mut sheet = Sheet::new(4, [192, 144]);
     for (i, method) in [Method::Path, Method::Light, Method::Bidirectional, Method::Photon].iter().enumerate()
