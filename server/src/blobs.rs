@@ -154,7 +154,7 @@ impl Blobs {
     }
 
     fn key(&self, name: &impl fmt::Display) -> Key {
-        Key::from_iter(self.prefix.parts().chain(Key::from(name.to_string()).parts()))
+        self.prefix.parts().chain(Key::from(name.to_string()).parts()).collect()
     }
 
     /// Whether blobs can be listed: address, keys and bucket are right.

@@ -414,7 +414,7 @@ fn unlit(glb: &[u8], settings: &Settings, white: f32, n: u32) -> Vec<Rgb> {
         let ray = camera_ray(&scene, settings, pixel, &Sampler::new(1, 0, pixel, k), Moment::STILL);
         let hit = scene.closest(&ray, || 0)?;
         let at = scene.data.interaction(hit.instance, hit.triangle, hit.barycentric, Moment::STILL);
-        Some(at.material.base(&scene.data.textures, &at.at).truncate() * white)
+        Some(at.material.shown(&scene.data.textures, &at.at)? * white)
     };
     let pixels = (0..settings.size.height).flat_map(|y| (0..settings.size.width).map(move |x| [x, y]));
     pixels.map(|pixel| (0..n).filter_map(|k| one(pixel, k)).sum::<Rgb>() / n as f32).collect()

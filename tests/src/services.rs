@@ -12,6 +12,7 @@ pub struct Shared {
 
 impl Shared {
     /// For the test of that name; `None` where there are no such services, which is said.
+    #[expect(clippy::print_stderr, reason = "what a test skips is for people to see")]
     pub fn place(name: &str) -> Option<Self> {
         let (Ok(server), Ok(bucket)) = (env::var("OVTIGRE_TEST_POSTGRES"), env::var("OVTIGRE_TEST_BUCKET"))
         else {

@@ -14,7 +14,7 @@ pub struct WorkFlags {
     /// The farm's address.
     #[arg(long, value_name = "URL", default_value = "http://127.0.0.1:7700")]
     pub server: String,
-    /// Token that the farm knows [default: the environment's OVTIGRE_TOKEN].
+    /// Token that the farm knows [default: `OVTIGRE_TOKEN` of the environment].
     #[arg(long, value_name = "TOKEN")]
     pub token: Option<String>,
     /// Threads to render with [default: one a core].

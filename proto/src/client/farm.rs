@@ -6,6 +6,7 @@ use super::{
     backoff::Backoff,
     call::{Call, Payload, Repeat},
     error::{ClientError, innermost},
+    tls,
 };
 use reqwest::{
     Response, StatusCode,
@@ -47,22 +48,17 @@ impl Client {
     /// For the farm at `address`. `seed` spreads the waits of many clients.
     pub fn new(address: &str, seed: u64) -> Result<Self, ClientError> {
         let address = Address::parse(address)?;
-        super::tls::provide();
-        let mut builder = reqwest::Client::builder()
-            .connect_timeout(Duration::from_secs(5))
-            .pool_idle_timeout(Duration::from_secs(30))
-            .tcp_nodelay(true)
-            .user_agent(concat!("ovtigre/", env!("CARGO_PKG_VERSION")));
-        if address.is_loopback() {
-            builder = builder.no_proxy();
-        }
+        let near = |builder: reqwest::ClientBuilder| {
+            if address.is_loopback() { builder.no_proxy() } else { builder }
+        };
         let wrong = |e| ClientError::Address { text: address.to_string(), reason: innermost(&e) };
-        let http = builder.build().map_err(wrong)?;
-        let mut elsewhere = reqwest::Client::builder().connect_timeout(ELSEWHERE);
-        if address.is_loopback() {
-            elsewhere = elsewhere.no_proxy();
-        }
-        let elsewhere = elsewhere.build().map_err(wrong)?;
+        let http = tls::client(|| {
+            let builder = reqwest::Client::builder().connect_timeout(Duration::from_secs(5));
+            let builder = builder.pool_idle_timeout(Duration::from_secs(30)).tcp_nodelay(true);
+            near(builder.user_agent(concat!("ovtigre/", env!("CARGO_PKG_VERSION"))))
+        });
+        let elsewhere = tls::client(|| near(reqwest::Client::builder().connect_timeout(ELSEWHERE)));
+        let (http, elsewhere) = (http.map_err(wrong)?, elsewhere.map_err(wrong)?);
         Ok(Self {
             http,
             elsewhere,

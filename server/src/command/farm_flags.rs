@@ -11,7 +11,7 @@ pub(crate) struct FarmFlags {
     /// The farm's address.
     #[arg(long, value_name = "URL", default_value = "http://127.0.0.1:7700")]
     pub(crate) server: String,
-    /// Token that the farm knows [default: the environment's OVTIGRE_TOKEN].
+    /// Token that the farm knows [default: `OVTIGRE_TOKEN` of the environment].
     #[arg(long, value_name = "TOKEN")]
     pub(crate) token: Option<String>,
     /// Print JSON.

@@ -36,7 +36,7 @@ pub(crate) struct Render {
     /// Render on this farm instead of starting one.
     #[arg(long, value_name = "URL", conflicts_with_all = ["workers", "threads", "data"])]
     server: Option<String>,
-    /// Token that this farm knows [default: the environment's OVTIGRE_TOKEN].
+    /// Token that this farm knows [default: `OVTIGRE_TOKEN` of the environment].
     #[arg(long, value_name = "TOKEN", requires = "server")]
     token: Option<String>,
     /// Show the log of farm and workers instead of a bar.

@@ -30,12 +30,12 @@ pub(crate) struct Serve {
     #[arg(long, value_name = "DIR", default_value = "ovtigre-data")]
     data: PathBuf,
     /// Keep jobs in a PostgreSQL database instead, postgres://USER:PASSWORD@HOST:PORT/DATABASE; any number of farms over
-    /// the same database and blobs are one farm. [env: OVTIGRE_DATABASE]
+    /// the same database and blobs are one farm. [env: `OVTIGRE_DATABASE`]
     #[arg(long, value_name = "URL")]
     database: Option<String>,
-    /// Keep scenes, sums and pictures in a bucket of an S3-compatible service instead, s3://BUCKET/PREFIX; keys, region
-    /// and endpoint as for the service's own programs: AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY, AWS_REGION,
-    /// AWS_ENDPOINT_URL. [env: OVTIGRE_BLOBS]
+    /// Keep scenes, sums and pictures in a bucket of an S3-compatible service instead, `s3://BUCKET/PREFIX`; keys, region
+    /// and endpoint as for the service's own programs: `AWS_ACCESS_KEY_ID`, `AWS_SECRET_ACCESS_KEY`, `AWS_REGION`,
+    /// `AWS_ENDPOINT_URL`. [env: `OVTIGRE_BLOBS`]
     #[arg(long, value_name = "URL")]
     blobs: Option<String>,
     /// Worker processes to start on this machine.
@@ -90,19 +90,11 @@ impl Serve {
         let interrupt = Interrupt::listen();
         let cache = self.data.join("worker-scenes");
         // A password in the environment is not in the list of processes.
-        let named = |flag: Option<String>, name| flag.or_else(|| std::env::var(name).ok());
-        let database = named(self.database, "OVTIGRE_DATABASE");
-        let blobs = named(self.blobs, "OVTIGRE_BLOBS");
+        let named = |flag: &Option<String>, name| flag.clone().or_else(|| std::env::var(name).ok());
+        let database = named(&self.database, "OVTIGRE_DATABASE");
+        let blobs = named(&self.blobs, "OVTIGRE_BLOBS");
         let own_token = secret::token()?;
-        let disk = self.data.clone();
-        let rules = Rules {
-            audit: self.audit,
-            reserve_bytes: (self.reserve * f64::from(1 << 30)) as u64,
-            jobs_per_token: self.jobs_per_token,
-            // Where blobs are elsewhere the disk is not what fills.
-            room: Room::new(move || free_bytes(&disk)),
-            ..Rules::default()
-        };
+        let rules = self.rules();
         let listens_to_all = !self.listen.ip().is_loopback();
         let guarding = Guarding {
             without_tokens: match (listens_to_all, self.insecure) {
@@ -164,14 +156,27 @@ impl Serve {
     }
 }
 
+impl Serve {
+    fn rules(&self) -> Rules {
+        let disk = self.data.clone();
+        Rules {
+            audit: self.audit,
+            reserve_bytes: (self.reserve * f64::from(1 << 30)) as u64,
+            jobs_per_token: self.jobs_per_token,
+            // Where blobs are elsewhere the disk is not what fills.
+            room: Room::new(move || free_bytes(&disk)),
+            ..Rules::default()
+        }
+    }
+}
+
 /// An error where a farm that others can reach has no token that would let them in.
 async fn need_tokens(database: Option<&str>, data: &Path, listen: SocketAddr) -> Outcome {
-    let store = match database {
-        Some(url) => Sql::server(url).await,
-        None => {
-            std::fs::create_dir_all(data).ok();
-            Sql::beside(&data.join("farm.sqlite")).await
-        }
+    let store = if let Some(url) = database {
+        Sql::server(url).await
+    } else {
+        std::fs::create_dir_all(data).ok();
+        Sql::beside(&data.join("farm.sqlite")).await
     };
     let store = store.map_err(|e| CommandError::wrong(e.to_string()))?;
     let tokens = store.tokens().await.map_err(|e| CommandError::wrong(e.to_string()));

@@ -23,7 +23,7 @@ pub(crate) struct Token {
     /// Folder of the farm's memory.
     #[arg(long, value_name = "DIR", default_value = "ovtigre-data", global = true)]
     data: PathBuf,
-    /// The farm's PostgreSQL database, where it has one. [env: OVTIGRE_DATABASE]
+    /// The farm's PostgreSQL database, where it has one. [env: `OVTIGRE_DATABASE`]
     #[arg(long, value_name = "URL", global = true)]
     database: Option<String>,
 }
@@ -60,14 +60,13 @@ impl Token {
 
     async fn open(&self) -> Outcome<Sql> {
         let database = self.database.clone().or_else(|| std::env::var("OVTIGRE_DATABASE").ok());
-        let opened = match database {
-            Some(url) => Sql::server(&url).await,
-            None => {
-                std::fs::create_dir_all(&self.data).map_err(|e| {
-                    CommandError::wrong(format!("the folder '{}' cannot be used: {e}", self.data.display()))
-                })?;
-                Sql::beside(&self.data.join("farm.sqlite")).await
-            }
+        let opened = if let Some(url) = database {
+            Sql::server(&url).await
+        } else {
+            std::fs::create_dir_all(&self.data).map_err(|e| {
+                CommandError::wrong(format!("the folder '{}' cannot be used: {e}", self.data.display()))
+            })?;
+            Sql::beside(&self.data.join("farm.sqlite")).await
         };
         opened.map_err(|e| CommandError::wrong(e.to_string()))
     }

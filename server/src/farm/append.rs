@@ -114,7 +114,9 @@ impl Merge {
     /// Takes up what was brought to and looked at by whoever appends.
     pub(super) fn follow(&mut self, commits: Vec<CommitRow>, checkpoints: u32) {
         self.checkpoints = self.checkpoints.max(checkpoints);
-        commits.into_iter().for_each(|row| self.add(Arrival { row, sum: None }));
+        for row in commits {
+            self.add(Arrival { row, sum: None });
+        }
     }
 
     /// Keeps at most `bytes` of decoded sums among what waits: the others are read from their blobs

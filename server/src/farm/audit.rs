@@ -131,14 +131,14 @@ impl Farm {
                 self.book().take_back(&released.lease);
             }
         }
-        self.drop_audits(Instant::now(), Some(worker));
+        self.drop_audits(Some(worker));
         Ok(())
     }
 
-    /// Batches for comparison come back whose leases were not renewed since `before`, or are a worker's.
-    pub(super) fn drop_audits(&self, before: Instant, by: Option<&WorkerId>) {
+    /// Batches for comparison come back whose leases have ended, or are a worker's.
+    pub(super) fn drop_audits(&self, by: Option<&WorkerId>) {
         let mut book = self.book();
-        let before = if by.is_some() { before - self.rules.lease } else { before };
+        let before = Instant::now().checked_sub(self.rules.lease);
         for lease in book.audits_held(before, by) {
             if let Some((row, audit)) = book.end_audit(&lease) {
                 book.audits.ask(row.job, row.batch, audit);

@@ -263,8 +263,9 @@ impl Book {
     }
 
     /// Leases for comparison that were not renewed since `before`, or that are a worker's.
-    pub fn audits_held(&self, before: Instant, by: Option<&WorkerId>) -> Vec<LeaseId> {
-        let ended = |held: &&Holding| held.renewed < before || Some(&held.row.worker) == by;
+    pub fn audits_held(&self, before: Option<Instant>, by: Option<&WorkerId>) -> Vec<LeaseId> {
+        let ended =
+            |held: &&Holding| before.is_some_and(|at| held.renewed < at) || Some(&held.row.worker) == by;
         let held = self.leases.values().filter(|held| held.audit.is_some()).filter(ended);
         held.map(|held| held.row.id.clone()).collect()
     }

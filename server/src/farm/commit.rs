@@ -23,7 +23,7 @@ use ovtigre_proto::{
     id::{BlobId, JobId, LeaseId, WorkerId},
     lease::{Commit, FailureKind, LeaseFailure},
 };
-use std::{sync::Arc, time::Duration};
+use std::{collections::BTreeSet, sync::Arc, time::Duration};
 
 /// Longest time that is believed of one batch.
 const TIME_MAX: Duration = Duration::from_hours(30 * 24);
@@ -115,11 +115,7 @@ impl Farm {
                 self.counters.count(Fate::Accepted);
                 let failed = self.book().brought(&job, key);
                 if let Some(worker) = &worker {
-                    self.crew().clear(worker);
-                    // What another could render was not the job's fault.
-                    for at_fault in failed.iter().filter(|other| *other != worker) {
-                        self.blame(at_fault, &job, "another worker could render what it could not").await?;
-                    }
+                    self.honour(worker, &job, failed).await?;
                     if self.is_audited(lease) {
                         let audit = Audit { first: worker.clone(), second: None };
                         self.book().audits.ask(job.clone(), key, audit);
@@ -147,6 +143,15 @@ impl Farm {
                 Err(FarmError::not_found("lease", lease))
             }
         }
+    }
+
+    /// A worker has brought what those in `failed` could not render: that was not the job's fault.
+    async fn honour(&self, worker: &WorkerId, job: &JobId, failed: BTreeSet<WorkerId>) -> Result<()> {
+        self.crew().clear(worker);
+        for at_fault in failed.iter().filter(|other| *other != worker) {
+            self.blame(at_fault, job, "another worker could render what it could not").await?;
+        }
+        Ok(())
     }
 
     /// A sum that cannot be used is its worker's fault, and the batch goes to another.

@@ -65,12 +65,11 @@ impl Farm {
 
     async fn hear(&self, id: &WorkerId, said: &Exchange) -> Result<(WorkerState, Arc<WorkerJoin>)> {
         let known = self.crew().get(id);
-        let (before, join) = match &known {
-            Some(member) => (member.state, Arc::clone(&member.join)),
-            None => {
-                let row = self.worker_row(id).await?;
-                (row.state, Arc::new(row.join))
-            }
+        let (before, join) = if let Some(member) = &known {
+            (member.state, Arc::clone(&member.join))
+        } else {
+            let row = self.worker_row(id).await?;
+            (row.state, Arc::new(row.join))
         };
         let state = match before {
             WorkerState::Gone => return Err(FarmError::not_found("worker", id)),
@@ -175,7 +174,9 @@ impl Farm {
             Ok(claimed) => claimed,
             Err(error) => {
                 let mut book = self.book();
-                offers.into_iter().for_each(|offer| book.withdraw(offer));
+                for offer in offers {
+                    book.withdraw(offer);
+                }
                 return Err(error);
             }
         };

@@ -59,7 +59,9 @@ impl Farm {
         }
         let mut book = self.book();
         for (job, batches) in returned {
-            batches.into_iter().for_each(|batch| book.put_back(&job, batch));
+            for batch in batches {
+                book.put_back(&job, batch);
+            }
         }
         Ok(())
     }

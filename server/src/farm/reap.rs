@@ -9,10 +9,7 @@ use super::{
 };
 use crate::{blobs::BlobFolder, store::error::StoreError};
 use ovtigre_proto::{lease::FailureKind, status::JobState};
-use std::{
-    sync::Arc,
-    time::{Duration, Instant},
-};
+use std::{sync::Arc, time::Duration};
 
 /// How long a job rests after its store or its files failed.
 const REST: Duration = Duration::from_secs(1);
@@ -29,9 +26,7 @@ impl Farm {
             }
             self.judge(&released, FailureKind::HandedBack, "its worker was not heard of in time").await?;
         }
-        if let Some(before) = Instant::now().checked_sub(self.rules.lease) {
-            self.drop_audits(before, None);
-        }
+        self.drop_audits(None);
         for worker in self.store.lose_workers(self.rules.silence).await? {
             tracing::warn!(%worker, "worker is lost");
             self.crew().remove(&worker);

@@ -123,6 +123,19 @@ impl Farm {
     }
 }
 
+/// Whether samples can be split over replicates, and replicates tell an error.
+fn shares(request: &JobRequest, samples: u32, replicates: u32, note: &mut impl FnMut(&str, String)) {
+    if samples < replicates {
+        let detail = format!(
+            "{samples} samples cannot be split over {replicates} replicates: ask for more, or for fewer replicates"
+        );
+        note("/samples", detail);
+    }
+    if request.error.is_some() && replicates < 3 {
+        note("/replicates", "an error target needs 3 replicates or more: fewer have no interval".to_owned());
+    }
+}
+
 /// A request with every default resolved, or all its faults.
 pub fn resolve(
     request: JobRequest,
@@ -150,15 +163,7 @@ pub fn resolve(
     }
     let samples = request.samples.unwrap_or(SAMPLES_DEFAULT);
     let replicates = request.replicates.unwrap_or(REPLICATES_DEFAULT.min(samples));
-    if samples < replicates {
-        let detail = format!(
-            "{samples} samples cannot be split over {replicates} replicates: ask for more, or for fewer replicates"
-        );
-        note("/samples", detail);
-    }
-    if request.error.is_some() && replicates < 3 {
-        note("/replicates", "an error target needs 3 replicates or more: fewer have no interval".to_owned());
-    }
+    shares(&request, samples, replicates, &mut note);
     let lens = lens(&request).unwrap_or_else(|(pointer, detail)| {
         note(pointer, detail);
         None

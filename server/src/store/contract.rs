@@ -304,7 +304,7 @@ async fn pauses_are_no_run_time(store: &dyn Store) {
     store.change_job(&job, 2, state(JobState::Paused)).await.unwrap();
     let paused = run().await;
     assert!(paused >= 0.035, "{paused}");
-    tokio::time::sleep(Duration::from_millis(1000)).await;
+    tokio::time::sleep(Duration::from_secs(1)).await;
     assert!((run().await - paused).abs() < 1e-9);
     store.change_job(&job, 3, state(JobState::Running)).await.unwrap();
     tokio::time::sleep(Duration::from_millis(20)).await;
@@ -373,7 +373,7 @@ async fn one_appends_to_a_job(store: &dyn Store) {
     assert_eq!(take("y", LONG).await, None, "x has it");
     assert_eq!(store.keep_merges("x", short).await.unwrap(), [(job.clone(), first)]);
     store.set_snapshot(&job, first, lane, 1).await.unwrap();
-    tokio::time::sleep(Duration::from_millis(1000)).await;
+    tokio::time::sleep(Duration::from_secs(1)).await;
     store.set_snapshot(&job, first, lane, 2).await.unwrap();
     let second = take("y", LONG).await.unwrap();
     assert_ne!(first, second);

@@ -42,7 +42,8 @@ pub(crate) struct Bench {
 
 /// Fast enough for tests, else as always.
 pub(crate) fn rules() -> Rules {
-    Rules { tick: Duration::from_millis(10), rest: Duration::ZERO, kept_sums_bytes: 0, ..Rules::default() }
+    let (tick, beat) = (Duration::from_millis(10), Duration::from_millis(1));
+    Rules { tick, beat, rest: Duration::ZERO, kept_sums_bytes: 0, ..Rules::default() }
 }
 
 async fn open(folder: &TempDir, rules: Rules) -> Arc<Farm> {

@@ -87,10 +87,12 @@ fn join() -> WorkerJoin {
     }
 }
 
+type Change<'a> = &'a dyn Fn(&mut WorkerJoin);
+
 #[tokio::test]
 async fn what_no_worker_is_does_not_join() {
     let bench = Bench::new(rules()).await;
-    let cases: [(&str, &dyn Fn(&mut WorkerJoin)); 7] = [
+    let cases: [(&str, Change<'_>); 7] = [
         ("/threads", &|j| j.threads = 0),
         ("/threads", &|j| j.threads = u32::MAX),
         ("/name", &|j| j.name = String::new()),

@@ -27,7 +27,7 @@ pub(super) static POSTGRES: Migrator = sqlx::migrate!("./migrations/postgres");
 #[derive(Clone, Debug)]
 pub(super) enum Source {
     /// In a file.
-    File(SqliteConnectOptions),
+    File(Box<SqliteConnectOptions>),
     /// On a server.
     Server(Box<PgConnectOptions>),
 }
@@ -51,7 +51,7 @@ impl Source {
             .synchronous(SqliteSynchronous::Full)
             .busy_timeout(Duration::from_secs(10))
             .pragma("journal_size_limit", "67108864");
-        Self::File(options)
+        Self::File(Box::new(options))
     }
 
     /// A server: `postgres://user:password@host:port/database`. A program that hangs within a transaction
