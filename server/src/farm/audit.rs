@@ -1,7 +1,10 @@
 //! Batches that are rendered again by somebody else, to compare.
 
 use super::{Farm, counters::Fate, error::Result, live::Live};
-use crate::store::row::{BatchKey, Lane};
+use crate::{
+    blobs::BlobName,
+    store::row::{BatchKey, Lane},
+};
 use ovtigre_proto::{
     id::{BlobId, JobId, LeaseId, WorkerId},
     lease::Commit,
@@ -172,6 +175,11 @@ impl Farm {
     /// Batches whose sums are lost or doubtful are handed out again.
     pub(super) async fn again(&self, live: &Live, batches: Vec<BatchKey>, lanes: Vec<Lane>) -> Result<()> {
         tracing::warn!(job = %live.id, batches = batches.len(), "batches are rendered again");
+        // A blob that is there is not written again: what is damaged goes before its row does.
+        let ledger = self.store.ledger(&live.id).await?;
+        for row in ledger.commits.into_iter().filter(|row| batches.contains(&row.batch)) {
+            self.blobs.delete(&BlobName::Partial(live.id.clone(), row.batch, row.hash)).await?;
+        }
         self.store.uncommit(&live.id, batches.clone(), lanes).await?;
         let mut book = self.book();
         for batch in batches {

@@ -237,7 +237,10 @@ async fn sums_that_are_lost_or_damaged_on_the_disk_are_rendered_again() {
     calm.until_settled(&job, JobState::Done).await;
     let expected = calm.pixels(&job).await;
     for harm in [Harm::Removed, Harm::Cut, Harm::OneBitFlipped] {
-        let mut bench = Bench::new(Rules { fresh_bytes: 0, partials_kept: 2, ..rules() }).await;
+        // Whoever comes after a crash appends when the mandate of the one before has ended.
+        let (mandate, keep_mandate) = (Duration::from_millis(400), Duration::from_millis(50));
+        let rules = Rules { fresh_bytes: 0, partials_kept: 2, mandate, keep_mandate, ..rules() };
+        let mut bench = Bench::new(rules).await;
         let job = bench.job(4000, |_| ()).await;
         let mut harmed = 0;
         for round in 0..6 {
@@ -259,7 +262,12 @@ async fn sums_that_are_lost_or_damaged_on_the_disk_are_rendered_again() {
         }
         assert!(harmed > 6, "{harmed}");
         let worker = bench.worker().await;
-        bench.work(&worker, Spread::Noisy).await;
+        for _ in 0..50 {
+            bench.work(&worker, Spread::Noisy).await;
+            if bench.farm.live(&job).is_none() {
+                break;
+            }
+        }
         let status = bench.until_settled(&job, JobState::Done).await;
         assert_eq!(status.batches_done, status.batches_asked, "{harm:?}");
         assert_eq!(bench.pixels(&job).await, expected, "{harm:?}");
