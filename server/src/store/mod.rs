@@ -8,6 +8,8 @@ pub mod sql;
 
 #[cfg(test)]
 pub mod contract;
+#[cfg(test)]
+mod contract_changes;
 
 use error::Result;
 use ovtigre_proto::{
