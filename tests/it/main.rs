@@ -6,6 +6,7 @@ mod bad_input;
 mod caustics;
 mod closed_forms;
 mod expressions;
+mod fail_points;
 mod faults;
 mod gltf;
 mod lens;

@@ -10,4 +10,5 @@ pub mod scenes;
 pub mod services;
 pub mod showcase;
 pub mod stage;
+pub mod tended;
 pub mod textures;

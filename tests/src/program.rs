@@ -17,6 +17,19 @@ fn program() -> PathBuf {
     program
 }
 
+/// The program, to be given arguments.
+pub fn command() -> Command {
+    Command::new(program())
+}
+
+/// Starts a worker of one thread for the farm at an address.
+pub fn worker_of(url: &str) -> Process {
+    let mut work = command();
+    work.args(["work", "--threads", "1", "--server", url]);
+    let work = work.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    Process(work.spawn().expect("the program starts"))
+}
+
 /// Runs a command to its end.
 pub fn run<S: AsRef<OsStr>>(arguments: impl IntoIterator<Item = S>) -> Output {
     Command::new(program()).args(arguments).stdin(Stdio::null()).output().expect("the program starts")
@@ -86,14 +99,7 @@ impl Farm {
 
     /// Starts a worker of one thread.
     pub fn worker(&self) -> Process {
-        let child = Command::new(program())
-            .args(["work", "--threads", "1", "--server", &self.url])
-            .stdin(Stdio::null())
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .spawn()
-            .expect("the program starts");
-        Process(child)
+        worker_of(&self.url)
     }
 
     /// Runs a client's command to its end and returns what it wrote; it must succeed.

@@ -12,6 +12,7 @@ use super::{
 };
 use crate::{
     blobs::{BlobError, BlobName},
+    fail_point::FailPoint,
     store::row::{BatchKey, CommitOutcome, CommitRow, NewCommit},
 };
 use bytes::Bytes;
@@ -64,6 +65,7 @@ impl Farm {
             Err(FarmError::TooLarge { limit })
         } else {
             let partial = self.blobs.get(&name).await?;
+            FailPoint::SumHanded.pass();
             self.take_sum(lease, partial, time, Way::Handed).await
         };
         self.blobs.delete(&name).await?;
@@ -97,10 +99,12 @@ impl Farm {
             return self.compare(&live, key, &row.worker, audit, &hash).await;
         }
         let name = BlobName::Partial(job.clone(), key, hash.clone());
+        FailPoint::SumBeforeBlob.pass();
         match way {
             Way::Here => self.blobs.put_once(&name, partial).await?,
             Way::Handed => self.blobs.rename(&BlobName::Handed(lease.clone()), &name).await?,
         }
+        FailPoint::SumAfterBlob.pass();
         let worker = self.book().lease(lease).map(|held| held.row.worker.clone());
         let micros = time.min(TIME_MAX).as_micros() as u64;
         let row = CommitRow { batch: key, hash, worker_micros: micros };
@@ -112,6 +116,7 @@ impl Farm {
         };
         match self.store.commit(new).await? {
             CommitOutcome::First => {
+                FailPoint::SumAfterRow.pass();
                 self.counters.count(Fate::Accepted);
                 let failed = self.book().brought(&job, key);
                 if let Some(worker) = &worker {
@@ -122,6 +127,7 @@ impl Farm {
                     }
                 }
                 self.arrive(&live, row, sum);
+                FailPoint::SumBeforeReply.pass();
                 Ok(Commit::Accepted)
             }
             CommitOutcome::Same => {

@@ -10,6 +10,7 @@ use super::{
 };
 use crate::{
     blobs::BlobName,
+    fail_point::FailPoint,
     store::row::{Claim, LeaseRow, Released},
 };
 use ovtigre_proto::{
@@ -248,9 +249,11 @@ impl Farm {
         }
         let (places, claims): (Vec<usize>, Vec<Claim>) = claims.into_iter().unzip();
         if !claims.is_empty() {
+            FailPoint::ClaimBeforeRow.pass();
             for (place, yes) in places.into_iter().zip(self.store.claim(claims, self.rules.lease).await?) {
                 claimed[place] = yes;
             }
+            FailPoint::ClaimAfterRow.pass();
         }
         Ok(claimed)
     }
