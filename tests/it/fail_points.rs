@@ -29,8 +29,10 @@ fn later(point: FailPoint) -> Option<Death> {
     let time = match point {
         FailPoint::GroupBeforeCommit | FailPoint::GroupAfterCommit => 7,
         FailPoint::SumAfterBlob | FailPoint::SumAfterRow => 11,
-        FailPoint::CheckpointBeforeRow | FailPoint::CheckpointAfterRow => 3,
-        FailPoint::PrefixAfterBlob | FailPoint::PrefixAfterRow => 3,
+        FailPoint::PrefixAfterBlob
+        | FailPoint::PrefixAfterRow
+        | FailPoint::CheckpointBeforeRow
+        | FailPoint::CheckpointAfterRow => 3,
         FailPoint::PartialsBetween => 5,
         _ => return None,
     };

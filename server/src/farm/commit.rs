@@ -99,7 +99,6 @@ impl Farm {
             return self.compare(&live, key, &row.worker, audit, &hash).await;
         }
         let name = BlobName::Partial(job.clone(), key, hash.clone());
-        FailPoint::SumBeforeBlob.pass();
         match way {
             Way::Here => self.blobs.put_once(&name, partial).await?,
             Way::Handed => self.blobs.rename(&BlobName::Handed(lease.clone()), &name).await?,
@@ -127,7 +126,6 @@ impl Farm {
                     }
                 }
                 self.arrive(&live, row, sum);
-                FailPoint::SumBeforeReply.pass();
                 Ok(Commit::Accepted)
             }
             CommitOutcome::Same => {
@@ -178,7 +176,7 @@ impl Farm {
         let (job, scene) = (live.id.clone(), live.scene.clone());
         let method = live.spec.settings.method.name();
         let planes = live.spec.settings.planes() as usize;
-        blocking(move || {
+        let decoded = blocking(move || {
             let read = exr::read_partial(&partial, batch.region.pixels());
             let (sum, says) = read.map_err(|e| FarmError::Sum(e.to_string()))?;
             if sum.batch != batch {
@@ -199,7 +197,9 @@ impl Farm {
             let hash = BlobId::of(sum.hash());
             Ok(Decoded { sum, hash, solution: says.solution })
         })
-        .await?
+        .await?;
+        FailPoint::SumBeforeBlob.pass();
+        decoded
     }
 
     /// The sum waits in memory where there is room, else as a blob.
@@ -207,6 +207,7 @@ impl Farm {
         let waiting: u64 = self.lives().iter().map(|live| live.fresh_bytes()).sum();
         let fits = waiting + super::live::sum_bytes(&sum) <= self.rules.fresh_bytes;
         live.arrive(Arrival { row, sum: fits.then_some(sum) });
+        FailPoint::SumBeforeReply.pass();
     }
 
     fn disagree(&self, job: &JobId, batch: BatchKey, got: &BlobId, kept: &BlobId, worker: Option<&WorkerId>) {
