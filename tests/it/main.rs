@@ -4,7 +4,9 @@
 
 mod bad_input;
 mod caustics;
+mod chaos;
 mod closed_forms;
+mod disk_full;
 mod expressions;
 mod fail_points;
 mod faults;

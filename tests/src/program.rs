@@ -24,7 +24,13 @@ pub fn command() -> Command {
 
 /// Starts a worker of one thread for the farm at an address.
 pub fn worker_of(url: &str) -> Process {
+    worker_with(url, &[])
+}
+
+/// The same with further variables.
+pub fn worker_with(url: &str, environment: &[(String, String)]) -> Process {
     let mut work = command();
+    work.envs(environment.iter().map(|(name, value)| (name, value)));
     work.args(["work", "--threads", "1", "--server", url]);
     let work = work.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
     Process(work.spawn().expect("the program starts"))
@@ -77,15 +83,32 @@ impl Farm {
 
     /// Starts a farm over a folder, with further flags.
     pub fn start_with(data: &Path, further: &[&str]) -> Self {
-        let mut child = Command::new(program())
-            .args(["serve", "--listen", "127.0.0.1:0", "--data"])
-            .arg(data)
-            .args(further)
-            .stdin(Stdio::null())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()
-            .expect("the program starts");
+        Self::start_as(command(), data, further)
+    }
+
+    /// Starts a farm in a folder that is a small disk of its own, of so many MiB; `None` where that is not allowed. The disk
+    /// goes away with the process.
+    pub fn start_on_a_disk(data: &Path, mib: u32, further: &[&str]) -> Option<Self> {
+        let allowed = Command::new("unshare").args(["-rm", "mount", "-t", "tmpfs", "none", "/mnt"]).output();
+        if !allowed.is_ok_and(|tried| tried.status.success()) {
+            return None;
+        }
+        std::fs::create_dir_all(data).expect("a folder");
+        let mut serve = Command::new("unshare");
+        let script = format!("mount -t tmpfs -o size={mib}m none \"$0\" && exec \"$@\"");
+        serve.args(["-rm", "sh", "-c", &script]).arg(data).arg(program());
+        Some(Self::start_as(serve, data, further))
+    }
+
+    /// The root of the farm's files, as it sees them.
+    pub fn root(&self) -> PathBuf {
+        PathBuf::from(format!("/proc/{}/root", self.process.0.id()))
+    }
+
+    fn start_as(mut serve: Command, data: &Path, further: &[&str]) -> Self {
+        serve.args(["serve", "--listen", "127.0.0.1:0", "--data"]).arg(data).args(further);
+        serve.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::null());
+        let mut child = serve.spawn().expect("the program starts");
         let mut line = String::new();
         let stdout = child.stdout.take().expect("piped");
         BufReader::new(stdout).read_line(&mut line).expect("the farm says where it listens");
