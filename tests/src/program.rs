@@ -120,6 +120,21 @@ impl Farm {
         self.process.kill();
     }
 
+    /// Seconds of processor time that its process has taken, and the most bytes that it ever had in memory.
+    pub fn cost(&self) -> (f64, u64) {
+        let about = |file| {
+            std::fs::read_to_string(format!("/proc/{}/{file}", self.process.0.id())).expect("it is there")
+        };
+        let stat = about("stat");
+        let after_name = stat.rsplit(')').next().expect("a line").split_whitespace();
+        // User and system time, in hundredths of a second on every Linux.
+        let ticks: f64 = after_name.skip(11).take(2).map(|t| t.parse::<f64>().expect("a number")).sum();
+        let status = about("status");
+        let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).expect("a line of memory");
+        let kib: u64 = peak.trim().trim_end_matches(" kB").parse().expect("a number");
+        (ticks / 100.0, kib << 10)
+    }
+
     /// Starts a worker of one thread.
     pub fn worker(&self) -> Process {
         worker_of(&self.url)
