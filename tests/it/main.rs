@@ -11,6 +11,7 @@ mod expressions;
 mod fail_points;
 mod faults;
 mod gltf;
+mod hostile;
 mod lens;
 mod methods;
 mod motion;

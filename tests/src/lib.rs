@@ -2,8 +2,10 @@
 
 pub mod clock;
 pub mod glb;
+pub mod hostile;
 pub mod irradiance;
 pub mod matrix;
+pub mod mutation;
 pub mod picture;
 pub mod program;
 pub mod proxy;
