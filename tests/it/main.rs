@@ -20,4 +20,5 @@ mod radiosity;
 mod same_bits;
 mod techniques;
 mod tidy;
+mod tls;
 mod weights;
