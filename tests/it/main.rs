@@ -4,8 +4,11 @@
 
 mod bad_input;
 mod caustics;
+mod chaos;
 mod closed_forms;
+mod disk_full;
 mod expressions;
+mod fail_points;
 mod faults;
 mod gltf;
 mod lens;

@@ -11,7 +11,10 @@ use ovtigre_proto::{
     id::WorkerId,
     lease::{Exchange, ExchangeReply, WorkerJoin},
 };
-use std::time::{Duration, Instant};
+use std::{
+    sync::atomic::{AtomicU64, Ordering},
+    time::{Duration, Instant},
+};
 use tokio::sync::watch;
 
 /// A farm that cannot be reached is asked again at most this often in the log.
@@ -32,6 +35,8 @@ pub struct Beat<'a> {
     pub bell: &'a Bell,
     /// Its name on the farm, once it has one.
     pub id: &'a watch::Sender<Option<WorkerId>>,
+    /// Exchanges that were begun.
+    pub beats: AtomicU64,
 }
 
 impl Beat<'_> {
@@ -87,6 +92,7 @@ impl Beat<'_> {
             wants: if staying { self.desk.wants() } else { 0 },
             scenes: self.scenes.at_hand(),
             leaving: !staying,
+            beat: self.beats.fetch_add(1, Ordering::Relaxed) + 1,
         };
         let asked = Instant::now();
         let reply = self.client.exchange(&id, &exchange).await?;

@@ -6,7 +6,7 @@ use super::{
     error::Result,
     live::{Ending, Live, Waits},
 };
-use crate::store::row::NewCheckpoint;
+use crate::{fail_point::FailPoint, store::row::NewCheckpoint};
 use ovtigre_core::{
     film::error::{ErrorEstimate, PlaneSummary, estimate, summarise},
     settings::Shows,
@@ -70,17 +70,33 @@ impl Farm {
             relative_error_upper: found.and_then(|e| e.relative_upper),
         };
         let mandate = Self::mandate(live)?;
+        FailPoint::CheckpointBeforeRow.pass();
         merge.checkpoints += 1;
         let checkpoint = NewCheckpoint { look: merge.checkpoints, row, layers: layers.clone(), progress };
         if let Err(error) = self.store.add_checkpoint(&live.id, mandate, checkpoint).await {
             merge.checkpoints -= 1;
             return Err(error.into());
         }
+        FailPoint::CheckpointAfterRow.pass();
         live.set_view(|view| {
-            view.curve.push(row);
+            if view.curve.len() < merge.checkpoints as usize {
+                view.curve.push(row);
+            }
             view.layers = layers;
         });
         Ok(row)
+    }
+}
+
+impl Merge {
+    /// The latest checkpoint is looked at once more where no lane is past it: whoever looked before may have
+    /// died when the job was about to end there.
+    pub(super) fn look_again(&mut self) {
+        let Some(latest) = self.checkpoints.checked_sub(1) else { return };
+        let Some(limit) = self.points.get(latest as usize) else { return };
+        if self.prefixes.iter().flatten().all(|prefix| prefix.blocks() <= *limit) {
+            self.checkpoints = latest;
+        }
     }
 }
 

@@ -135,7 +135,7 @@ impl Farm {
         let entry = book::Entry::new(row.scene.clone(), settings, plan, order, hand_out, wants);
         let mut book = self.book();
         book.add(row.id.clone(), entry);
-        ledger.leases.into_iter().for_each(|lease| book.hold(lease, None));
+        ledger.leases.into_iter().for_each(|lease| book.hold(lease, None, 0));
         Ok(())
     }
 }

@@ -8,7 +8,10 @@ use super::{
     rules::{PARTIAL_BYTES_MAX, Rules},
     spec::JobSpec,
 };
-use crate::store::row::{Added, IdempotencyKey, NewJob};
+use crate::{
+    fail_point::FailPoint,
+    store::row::{Added, IdempotencyKey, NewJob},
+};
 use ovtigre_core::{
     film::size::{Region, Size},
     settings::{CameraChoice, Environment, EnvironmentSource, Lens, Settings, Shutter},
@@ -110,8 +113,10 @@ impl Farm {
             regions: spec.schedule().regions().len() as u32,
             replicates: spec.settings.replicates,
         };
+        FailPoint::JobBeforeRow.pass();
         match self.store.add_job(new, key).await? {
             Added::New => {
+                FailPoint::JobAfterRow.pass();
                 let row = self.job_row(&id).await?;
                 tracing::info!(job = %id, name = row.name, "job taken");
                 self.take_up(&row).await?;
