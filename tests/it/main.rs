@@ -11,6 +11,7 @@ mod gltf;
 mod lens;
 mod methods;
 mod motion;
+mod page;
 mod photons;
 mod radiosity;
 mod same_bits;

@@ -52,7 +52,7 @@ function signIn() {
     el('form', { method: 'dialog', onsubmit: () => keepToken(field.value.trim()) },
       el('h2', { id: 'sign-title' }, 'Sign in'),
       el('label', { class: 'field' }, el('span', {}, 'Token'), field),
-      el('p', { class: 'hint' }, 'As ', el('code', {}, 'ovtigre token add'), ' has shown it. It is kept until this tab is closed, and nowhere else.'),
+      el('p', { class: 'hint' }, 'As ', el('code', {}, 'ovtigre token create'), ' has shown it. It is kept until this tab is closed, and nowhere else.'),
       el('div', { class: 'row end' },
         el('button', { type: 'button', onclick: () => dialog.close() }, 'Not now'),
         el('button', { class: 'primary' }, 'Sign in'))));

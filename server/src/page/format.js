@@ -20,7 +20,7 @@ export const count = (n) => (Number.isFinite(n) ? whole.format(n) : '–');
 export function short(n) {
   if (!Number.isFinite(n)) return '–';
   for (const [size, name] of [[1e12, 'T'], [1e9, 'G'], [1e6, 'M'], [1e3, 'k']]) {
-    if (n >= size) return `${digits(n / size)} ${name}`;
+    if (n >= size) return `${digits(n / size)}\u00a0${name}`;
   }
   return digits(n);
 }
@@ -31,35 +31,36 @@ export const samples = (n) => (Number.isInteger(n) ? count(n) : digits(n));
 /** A duration in seconds. */
 export function seconds(s) {
   if (!Number.isFinite(s)) return '–';
-  if (s < 0.0995) return `${digits(s * 1000, 2)} ms`;
-  if (s < 60) return `${s < 9.95 ? s.toFixed(1) : s.toFixed(0)} s`;
+  if (s < 0.0995) return `${digits(s * 1000, 2)}\u00a0ms`;
+  if (s < 60) return `${s < 9.95 ? s.toFixed(1) : s.toFixed(0)}\u00a0s`;
   const n = Math.round(s);
   const two = (x) => String(x).padStart(2, '0');
-  if (n < 3600) return `${Math.floor(n / 60)} min ${two(n % 60)} s`;
-  if (n < 86400) return `${Math.floor(n / 3600)} h ${two(Math.floor(n / 60) % 60)} min`;
-  return `${Math.floor(n / 86400)} d ${Math.floor(n / 3600) % 24} h`;
+  if (n < 3600) return `${Math.floor(n / 60)}\u00a0min\u00a0${two(n % 60)}\u00a0s`;
+  if (n > 315360000) return 'more than ten years';
+  if (n < 86400) return `${Math.floor(n / 3600)}\u00a0h\u00a0${two(Math.floor(n / 60) % 60)}\u00a0min`;
+  return `${Math.floor(n / 86400)}\u00a0d\u00a0${Math.floor(n / 3600) % 24}\u00a0h`;
 }
 
 /** A relative error. */
 export function percent(e) {
   if (!Number.isFinite(e)) return '–';
-  return e >= 10 ? `${whole.format(e * 100)} %` : `${digits(e * 100)} %`;
+  return e >= 10 ? `${whole.format(e * 100)}\u00a0%` : `${digits(e * 100)}\u00a0%`;
 }
 
 /** A value with its standard error, to the second digit of that. */
 export function plusMinus(value, error) {
   if (!Number.isFinite(value)) return '–';
   if (!Number.isFinite(error)) return digits(value, 4);
-  if (error === 0) return `${digits(value, 4)} ± 0`;
+  if (error === 0) return `${digits(value, 4)}\u00a0±\u00a00`;
   const after = Math.min(8, Math.max(0, 1 - Math.floor(Math.log10(error))));
-  if (after === 8 || error >= 1e6) return `${value.toExponential(3)} ± ${error.toExponential(1)}`;
-  return `${value.toFixed(after)} ± ${error.toFixed(after)}`;
+  if (after === 8 || error >= 1e6) return `${value.toExponential(3)}\u00a0±\u00a0${error.toExponential(1)}`;
+  return `${value.toFixed(after)}\u00a0±\u00a0${error.toFixed(after)}`;
 }
 
 /** A size of a file. */
 export function bytes(n) {
   if (!Number.isFinite(n)) return '–';
-  return n < 1000 ? `${n} B` : `${short(n)}B`;
+  return n < 1000 ? `${n}\u00a0B` : `${short(n)}B`;
 }
 
 /** A point of time. */

@@ -30,7 +30,7 @@ class JobView {
     this.why = el('div');
     this.workers = el('tbody');
     this.nobody = el('p', { class: 'empty' }, 'Nobody works at it now.');
-    this.journal = el('ol', { class: 'log' });
+    this.journal = el('ol', { class: 'log', tabindex: 0, 'aria-label': 'Log' });
     const axis = (key, title) => el('button', { type: 'button', 'aria-pressed': String(this.axis === key), onclick: (event) => {
       this.axis = key;
       for (const other of event.target.parentNode.children) other.setAttribute('aria-pressed', String(other === event.target));
@@ -54,15 +54,30 @@ class JobView {
       el('section', { class: 'panel flush', 'aria-label': 'Batches and workers' },
         el('div', { class: 'panel-head' }, el('h2', {}, 'Batches and workers'), this.batches = el('p', { class: 'hint' })),
         el('div', { class: 'scroll', tabindex: 0, role: 'region', 'aria-label': 'Workers at this job' }, el('table', {}, el('caption', { class: 'sr' }, 'Workers at this job'), workerHeads(false), this.workers)), this.nobody));
-    this.#tell(job.created_at, 'The job came.');
-    if (job.started_at) this.#tell(job.started_at, 'The first batch was handed out.');
-    if (job.ended_at) this.#tell(job.ended_at, `It was ${job.state}${job.reason ? `: ${job.reason}` : ''}.`);
+    new ResizeObserver(() => this.draw()).observe(this.plot);
     this.update(job, true);
   }
 
-  #tell(time, line) {
-    this.log.unshift({ time, line });
-    fill(this.journal, this.log.slice(0, 60).map((entry) => el('li', {}, el('time', { datetime: entry.time }, new Date(entry.time).toLocaleTimeString()), ' ', entry.line)));
+  /** What was before somebody looked: of checkpoints, at which run time. */
+  #begin() {
+    const { job, curve } = this;
+    this.begun = true;
+    const lines = [{ time: job.created_at, line: 'The job came.' }];
+    if (job.started_at) lines.push({ time: job.started_at, line: 'The first batch was handed out.' });
+    for (const row of curve.rows) lines.push({ at: seconds(row.wall_seconds), line: checkpointLine(row) });
+    if (job.ended_at) lines.push({ time: job.ended_at, line: `It was ${job.state}${job.reason ? `: ${job.reason}` : ''}.` });
+    this.log = [...this.log, ...lines.reverse()];
+    this.#showLog();
+  }
+
+  #tell(line) {
+    this.log.unshift({ time: new Date().toISOString(), line });
+    this.#showLog();
+  }
+
+  #showLog() {
+    fill(this.journal, this.log.slice(0, 100).map(({ time, at, line }) => el('li', {},
+      time ? el('time', { datetime: time, title: when(time) }, new Date(time).toLocaleTimeString()) : el('span', { class: 'at' }, `after ${at}`), ' ', line)));
   }
 
   #downloads() {
@@ -98,9 +113,10 @@ class JobView {
     text(this.title, job.name);
     if (first || before.state !== job.state) {
       fill(this.state, badge(job.state));
-      if (!first) this.#tell(new Date().toISOString(), `It is ${job.state}${job.reason ? `: ${job.reason}` : ''}.`);
+      if (!first) this.loadCurve().catch(() => {});
+      if (!first) this.#tell(`It is ${job.state}${job.reason ? `: ${job.reason}` : ''}.`);
     }
-    if (!first && before.workers !== job.workers) this.#tell(new Date().toISOString(), `${count(job.workers)} ${job.workers === 1 ? 'worker works' : 'workers work'} at it.`);
+    if (!first && before.workers !== job.workers) this.#tell(`${count(job.workers)} ${job.workers === 1 ? 'worker works' : 'workers work'} at it.`);
     text(this.reason, job.reason ?? '');
     this.reason.className = `reason ${job.state}`;
     this.bar.value = part(job);
@@ -171,7 +187,7 @@ class JobView {
     const paused = job.state === 'paused';
     fill(this.actions,
       over ? null : paused ? button('Resume', () => this.patch({ state: 'running' }), 'primary') : button('Pause', () => this.patch({ state: 'paused' })),
-      job.state !== 'failed' && job.state !== 'cancelled' ? button('More samples', () => this.#more()) : null,
+      job.state !== 'failed' && job.state !== 'cancelled' && !job.certified ? button('More samples', () => this.#more()) : null,
       job.state !== 'failed' && job.state !== 'cancelled' && job.settings.replicates > 2 ? button('Tighter error', () => this.#tighter()) : null,
       over ? null : button('Priority', () => this.#priority()),
       el('a', { class: 'button', href: `#/new?from=${job.id}` }, 'Again'),
@@ -228,13 +244,14 @@ class JobView {
   /** Fetches the curve and draws it. */
   async loadCurve() {
     this.curve = await get(`/v1/jobs/${this.job.id}/error.json`, { signal: this.signal });
+    if (!this.begun) this.#begin();
     this.draw();
   }
 
   draw() {
     if (!this.curve) return;
     const { curve } = this;
-    fill(this.plot, plot(curve, this.axis));
+    fill(this.plot, plot(curve, this.axis, Math.max(280, this.plot.clientWidth)));
     fill(this.curveTable, table(curve));
     const facts = [
       curve.slope === null ? null : `slope ${curve.slope.toFixed(2)} (−0.50 is plain Monte Carlo)`,
@@ -246,7 +263,7 @@ class JobView {
   }
 
   checkpoint(row) {
-    this.#tell(new Date().toISOString(), `Checkpoint at ${count(row.samples)} samples${row.relative_error === null ? '' : `: error ${percent(row.relative_error)}`}.`);
+    this.#tell(checkpointLine(row));
     this.viewer.keep();
     this.loadCurve().catch(() => {});
   }
@@ -258,6 +275,10 @@ class JobView {
     this.nobody.hidden = here.length > 0;
     this.workers.parentNode.parentNode.hidden = here.length === 0;
   }
+}
+
+function checkpointLine(row) {
+  return `Checkpoint at ${count(row.samples)} samples${row.relative_error === null ? '' : `: error ${percent(row.relative_error)}`}.`;
 }
 
 /** What is not made, in a line. */

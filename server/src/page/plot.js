@@ -3,12 +3,11 @@
 import { el, svg } from './dom.js';
 import { percent, seconds } from './format.js';
 
-const WIDTH = 640;
-const HEIGHT = 320;
 const LEFT = 62;
 const RIGHT = 16;
 const TOP = 14;
 const BOTTOM = 40;
+const AHEAD_MAX = 1000;
 
 /** A logarithmic scale from values to places, with its marks. */
 function scale(low, high, from, to) {
@@ -33,44 +32,47 @@ function bounds(values) {
   return [low / 1.15, high * 1.15];
 }
 
-/** The plot of a curve; `axis` is `wall_seconds` or `worker_seconds`. */
-export function plot(curve, axis) {
+/** The plot of a curve in a space of `width` pixels; `axis` is `wall_seconds` or `worker_seconds`. */
+export function plot(curve, axis, width) {
+  const height = Math.min(340, Math.max(220, width * 0.5));
   const rows = curve.rows.filter((row) => row.relative_error > 0 && row[axis] > 0);
   if (rows.length === 0) {
     return el('p', { class: 'empty' }, 'The first checkpoint is still to come. A single replicate has none.');
   }
-  const expected = axis === 'wall_seconds' && !curve.certified ? curve.target_expected_at_seconds : null;
   const last = rows.at(-1);
+  const ahead = axis === 'wall_seconds' && !curve.certified ? curve.target_expected_at_seconds : null;
+  // An end too far away to be drawn beside what is measured is told in words only.
+  const expected = ahead && ahead < last[axis] * AHEAD_MAX ? ahead : null;
   const target = curve.error_target;
   const xs = rows.map((row) => row[axis]);
-  if (expected) xs.push(Math.min(expected, last[axis] * 1e4));
+  if (expected) xs.push(expected);
   const ys = rows.flatMap((row) => [row.relative_error, row.relative_error_upper].filter((e) => e > 0));
   if (target) ys.push(target);
-  const x = scale(...bounds(xs), LEFT, WIDTH - RIGHT);
-  const y = scale(...bounds(ys), HEIGHT - BOTTOM, TOP);
+  const x = scale(...bounds(xs), LEFT, width - RIGHT);
+  const y = scale(...bounds(ys), height - BOTTOM, TOP);
   const at = (row) => `${x.place(row[axis]).toFixed(1)},${y.place(row.relative_error).toFixed(1)}`;
 
-  const drawing = svg('svg', { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, class: 'plot', role: 'img', 'aria-label': spoken(curve, rows, axis) });
+  const drawing = svg('svg', { viewBox: `0 0 ${width} ${height}`, width, height, class: 'plot', role: 'img', 'aria-label': spoken(curve, rows, axis) });
   for (const { value, named } of x.marks) {
     const here = x.place(value);
-    drawing.append(svg('line', { x1: here, x2: here, y1: TOP, y2: HEIGHT - BOTTOM, class: named ? 'grid' : 'grid faint' }));
-    if (named) drawing.append(svg('text', { x: here, y: HEIGHT - BOTTOM + 15, 'text-anchor': 'middle' }, mark(value)));
+    drawing.append(svg('line', { x1: here, x2: here, y1: TOP, y2: height - BOTTOM, class: named ? 'grid' : 'grid faint' }));
+    if (named) drawing.append(svg('text', { x: here, y: height - BOTTOM + 15, 'text-anchor': 'middle' }, mark(value)));
   }
   for (const { value, named } of y.marks) {
     const here = y.place(value);
-    drawing.append(svg('line', { x1: LEFT, x2: WIDTH - RIGHT, y1: here, y2: here, class: named ? 'grid' : 'grid faint' }));
-    if (named) drawing.append(svg('text', { x: LEFT - 7, y: here + 4, 'text-anchor': 'end' }, percent(value)));
+    drawing.append(svg('line', { x1: LEFT, x2: width - RIGHT, y1: here, y2: here, class: named ? 'grid' : 'grid faint' }));
+    if (named) drawing.append(svg('text', { x: LEFT - 7, y: here + 4, 'text-anchor': 'end' }, `${Number((value * 100).toPrecision(2))}\u00a0%`));
   }
-  drawing.append(svg('rect', { x: LEFT, y: TOP, width: WIDTH - LEFT - RIGHT, height: HEIGHT - TOP - BOTTOM, class: 'frame' }));
+  drawing.append(svg('rect', { x: LEFT, y: TOP, width: width - LEFT - RIGHT, height: height - TOP - BOTTOM, class: 'frame' }));
   if (target) {
     const here = y.place(target);
-    drawing.append(svg('line', { x1: LEFT, x2: WIDTH - RIGHT, y1: here, y2: here, class: 'target' }));
-    drawing.append(svg('text', { x: WIDTH - RIGHT - 6, y: here - 6, 'text-anchor': 'end', class: 'target' }, `target ${percent(target)}`));
+    drawing.append(svg('line', { x1: LEFT, x2: width - RIGHT, y1: here, y2: here, class: 'target' }));
+    drawing.append(svg('text', { x: LEFT + 6, y: here - 6, class: 'target' }, `target ${percent(target)}`));
   }
   if (expected && target && last.relative_error_upper > 0) {
-    const end = x.place(Math.min(expected, last[axis] * 1e4));
+    const end = x.place(expected);
     drawing.append(svg('line', { x1: x.place(last[axis]), y1: y.place(last.relative_error_upper), x2: end, y2: y.place(target), class: 'ahead' }));
-    drawing.append(svg('line', { x1: end, x2: end, y1: TOP, y2: HEIGHT - BOTTOM, class: 'ahead' }));
+    drawing.append(svg('line', { x1: end, x2: end, y1: TOP, y2: height - BOTTOM, class: 'ahead' }));
     drawing.append(svg('text', { x: end - 6, y: TOP + 14, 'text-anchor': 'end', class: 'ahead' }, `expected at ${seconds(expected)}`));
   }
   for (const row of rows) {
@@ -85,16 +87,19 @@ export function plot(curve, axis) {
       svg('title', {}, `${row.samples} samples, ${seconds(row[axis])}: ${percent(row.relative_error)}${row.relative_error_upper ? `, at most ${percent(row.relative_error_upper)}` : ''}`)));
   }
   drawing.append(
-    svg('text', { x: (LEFT + WIDTH - RIGHT) / 2, y: HEIGHT - 6, 'text-anchor': 'middle', class: 'title' }, axis === 'wall_seconds' ? 'run time' : 'time of all workers'));
+    svg('text', { x: (LEFT + width - RIGHT) / 2, y: height - 6, 'text-anchor': 'middle', class: 'title' }, axis === 'wall_seconds' ? 'run time' : 'time of all workers'));
   return drawing;
 }
 
-/** A duration on an axis. */
+const RAISED = '⁰¹²³⁴⁵⁶⁷⁸⁹';
+
+/** A duration on an axis: in one unit, as its steps are powers. */
 function mark(s) {
-  if (s < 1) return `${Number((s * 1000).toPrecision(2))} ms`;
-  if (s < 60) return `${s} s`;
-  if (s < 3600) return `${Number((s / 60).toPrecision(2))} min`;
-  return `${Number((s / 3600).toPrecision(2))} h`;
+  if (s >= 0.001 && s < 10000) return `${Number(s.toPrecision(1))}\u00a0s`;
+  const power = Math.floor(Math.log10(s) + 1e-9);
+  const raised = [...String(power)].map((c) => (c === '-' ? '⁻' : RAISED[Number(c)])).join('');
+  const factor = Math.round(s / 10 ** power);
+  return `${factor === 1 ? '' : `${factor}·`}10${raised}\u00a0s`;
 }
 
 function spoken(curve, rows, axis) {

@@ -51,7 +51,12 @@ class Form {
   #build(root) {
     this.told = el('p', { class: 'told', role: 'status' });
     this.bar = el('progress', { max: 1, value: 0, hidden: true, 'aria-label': 'Upload' });
-    const pick = (attributes) => el('input', { type: 'file', class: 'sr', ...attributes, onchange: (event) => this.take(chosen(event.target)) });
+    const pick = (attributes) => el('input', { type: 'file', class: 'sr', ...attributes, onchange: (event) => {
+      const files = chosen(event.target);
+      // So that the same file can be chosen again.
+      event.target.value = '';
+      this.take(files);
+    } });
     this.file = pick({ id: 'choose-file', accept: '.glb,.zip,.gltf', multiple: true });
     this.folder = pick({ id: 'choose-folder', webkitdirectory: true });
     this.drop = el('section', { class: 'drop', 'aria-label': 'Scene',
@@ -112,6 +117,8 @@ class Form {
     const lamps = [[lights.emissive_triangles, 'emissive triangles'], [lights.point, 'point'], [lights.spot, 'spot'], [lights.directional, 'directional']]
       .filter(([n]) => n > 0).map(([n, kind]) => `${count(n)} ${kind}`).join(', ');
     const list = (title, lines, kind) => (lines.length > 0 ? [el('h3', {}, title), el('ul', { class: kind }, lines.map((line) => el('li', {}, line)))] : null);
+    const tags = (title, words) => (words.length > 0 ? [el('h3', {}, title), el('p', {}, words.map((word) => el('span', { class: 'tag' }, word)))] : null);
+    const cameras = scene.cameras.map((title, i) => title || `camera ${i}`);
     this.picture = el('div', { class: 'preview', role: 'img', 'aria-label': 'Quick preview' }, el('p', {}, 'A quick preview appears here.'));
     fill(this.report, el('h2', {}, name ?? 'The scene'), this.picture,
       el('dl', { class: 'facts' },
@@ -119,11 +126,11 @@ class Form {
         row('Meshes', `${count(scene.meshes)}, placed ${count(scene.instances)} times`),
         row('Materials', `${count(scene.materials)}, ${count(scene.textures)} textures`),
         row('Lights', lamps || 'none'),
-        row('Cameras', scene.cameras.length > 0 ? scene.cameras.join(', ') : 'none: the scene is framed'),
+        row('Cameras', cameras.length > 0 ? cameras.join(', ') : 'none: the scene is framed'),
         scene.letters.length > 0 ? row('Surfaces scatter', scene.letters.join(', ')) : null,
         row('Size', bytes(scene.bytes)),
         row('Hash', el('span', { class: 'mono', title: scene.id }, `${scene.id.slice(0, 16)}…`))),
-      list('Needs', scene.needs), list('Leaves out', scene.leaves_out),
+      tags('Needs', scene.needs), tags('Does without', scene.leaves_out),
       list('Warnings', scene.warnings.map((w) => (w.pointer ? `${w.detail} (${w.pointer})` : w.detail)), 'warn'));
     this.report.hidden = false;
   }
@@ -161,7 +168,7 @@ class Form {
       group('Paths', el('div', { class: 'presets', role: 'group', 'aria-label': 'Presets' }, this.presets),
         this.#field('paths', 'Expression, from the light L to the eye E', line(r.paths ?? PRESETS.find(([key]) => key === this.preset)?.[1], { class: 'mono', oninput: () => this.#choose(null) }), 'D diffuse, S glossy or mirror-like, S_M mirrors only; (a|b)  x*  x+  x?  x{n,m}  [x]'),
         this.caret,
-        el('div', { class: 'grid' },
+        el('div', { class: 'grid roomy' },
           this.#field('method', 'Method', select(METHODS.map(([key, title]) => [key, `${key}: ${title}`]), r.method ?? 'auto')),
           this.#field('bounces', 'Bounces at most', number(r.bounces, { min: 0, step: 1, placeholder: 'no limit' })),
           this.#field('shadows', 'Shadows', select([['', 'on'], ['off', 'off: direct light is never blocked']], r.shadows ?? ''))),

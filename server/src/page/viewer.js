@@ -349,7 +349,7 @@ export class Viewer {
     const row = (title, ...values) => [el('dt', {}, title), values.map((value) => el('dd', {}, value))];
     const line = ({ name, value, error }) => {
       const luminance = LUMINANCE.reduce((sum, weight, c) => sum + weight * value[c], 0);
-      return row(name, ...value.map((v, c) => plusMinus(v, error?.[c])), `Y ${digits(luminance, 4)}`);
+      return row(name, ...value.map((v, c) => plusMinus(v, error?.[c])), digits(luminance, 4));
     };
     const layer = this.#layer.replace(/\.?error$/, '') || 'picture';
     const shown = planes.filter((plane) => plane.name === layer || plane.name === 'picture');

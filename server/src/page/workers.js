@@ -25,7 +25,7 @@ export function workerRow(worker, actions) {
 /** The head of such a table. */
 export function workerHeads(more) {
   const names = ['Worker', 'State', 'Speed', 'Threads', 'Batches', 'Failures', ...(more ? ['Job', 'Tags'] : []), 'Heard'];
-  const cells = names.map((name, i) => el('th', { scope: 'col', class: i >= 2 && i <= 5 ? 'number' : null }, name));
+  const cells = names.map((name, i) => el('th', { scope: 'col', class: (i >= 2 && i <= 5) || name === 'Heard' ? 'number' : null }, name));
   return el('thead', {}, el('tr', {}, cells, more ? el('td', {}) : null));
 }
 
