@@ -14,6 +14,7 @@ mod gltf;
 mod lens;
 mod methods;
 mod motion;
+mod page;
 mod photons;
 mod radiosity;
 mod same_bits;

@@ -27,15 +27,10 @@ impl Farm {
         self.status_of(&row).await
     }
 
-    /// Jobs, the newest first; `before` is where the last page ended.
-    pub async fn jobs(
-        &self,
-        state: Option<JobState>,
-        before: Option<i64>,
-        limit: u32,
-    ) -> Result<Page<JobStatus>> {
-        let limit = limit.clamp(1, PAGE_MAX);
-        let mut rows = self.store.jobs(JobFilter { state, before, limit: limit + 1 }).await?;
+    /// Jobs, the newest first.
+    pub async fn jobs(&self, filter: JobFilter) -> Result<Page<JobStatus>> {
+        let limit = filter.limit.clamp(1, PAGE_MAX);
+        let mut rows = self.store.jobs(JobFilter { limit: limit + 1, ..filter }).await?;
         let more = rows.len() > limit as usize;
         rows.truncate(limit as usize);
         let next = rows.last().filter(|_| more).map(|row| row.sequence.to_string());
