@@ -1,5 +1,6 @@
 //! What the tests share: scenes made by code, and renders of them without a farm.
 
+pub mod calibration;
 pub mod glb;
 pub mod irradiance;
 pub mod matrix;

@@ -6,6 +6,7 @@ use super::{
 };
 use crate::math::quantile::student_t_upper;
 use serde::{Deserialize, Serialize};
+use std::fmt;
 
 /// Probability that a job is ever stopped too early, over all its checkpoints together.
 pub const FALSE_STOP_PROBABILITY: f64 = 0.05;
@@ -40,6 +41,23 @@ pub struct Doubt {
     pub lone_share: f64,
     /// The pixels with the largest parts, the largest first.
     pub pixels: Vec<Culprit>,
+}
+
+impl fmt::Display for Doubt {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.cause {
+            Cause::FewPixels => write!(f, "the error is as good as in {:.1} pixels", self.effective_pixels)?,
+            Cause::LoneSamples => {
+                write!(
+                    f,
+                    "{:.0} % of the error is of light that one replicate found alone",
+                    100.0 * self.lone_share
+                )?;
+            }
+        }
+        let Some(worst) = self.pixels.first() else { return Ok(()) };
+        write!(f, ", {:.0} % of it at {},{}", 100.0 * worst.share, worst.x, worst.y)
+    }
 }
 
 /// What is wrong with an error.
