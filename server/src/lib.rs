@@ -4,6 +4,7 @@ pub mod api;
 pub mod blobs;
 pub mod farm;
 pub mod inspect;
+pub mod plot;
 pub mod serve;
 pub mod store;
 pub mod tls;

@@ -19,7 +19,7 @@ fn most_misses(n: usize, p: f64) -> usize {
 fn assert_honest(name: &str) {
     let cases = cases();
     let case = cases.iter().find(|case| case.name == name).unwrap();
-    let plan = Plan { runs: 100, looks: 4, replicates: 4, reference: 100, seed: 1_000_000 };
+    let plan = Plan { runs: 100, side: 12, looks: 4, replicates: 4, reference: 100, seed: 1_000_000 };
     let found = calibrate(case, plan);
     for look in 0..plan.looks {
         let [believed, covered] = found.covered(look);

@@ -25,8 +25,6 @@ use ovtigre_core::{
 use rayon::prelude::*;
 use std::fmt::Write as _;
 
-/// Pixels along a side.
-const SIDE: u32 = 32;
 /// Replicates of a reference.
 const REFERENCE_REPLICATES: u32 = 16;
 /// Seed of references; runs have others.
@@ -62,6 +60,8 @@ pub fn cases() -> Vec<Case> {
 pub struct Plan {
     /// Renders of each scene.
     pub runs: u32,
+    /// Pixels along a side of them.
+    pub side: u32,
     /// Looks at each: after 1, 2, 4 … samples of each replicate.
     pub looks: u32,
     /// Sequences of each render.
@@ -97,7 +97,8 @@ pub struct Calibration {
 
 /// Renders a case many times.
 pub fn calibrate(case: &Case, plan: Plan) -> Calibration {
-    let of = |method, seed, replicates| Settings { method, seed, ..settings(SIDE, SIDE, replicates) };
+    let of =
+        |method, seed, replicates| Settings { method, seed, ..settings(plan.side, plan.side, replicates) };
     let first = of(case.method, plan.seed, plan.replicates);
     let prepared = scene(&case.glb, &first);
     let longest = plan.replicates << (plan.looks - 1);

@@ -70,6 +70,16 @@ pub enum Cause {
     LoneSamples,
 }
 
+impl Cause {
+    /// As in JSON.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::FewPixels => "few_pixels",
+            Self::LoneSamples => "lone_samples",
+        }
+    }
+}
+
 /// A pixel that much of the error is in.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Culprit {

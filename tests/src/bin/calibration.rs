@@ -1,5 +1,5 @@
 //! Measures how often the certified error holds, and prints the tables of docs/ERROR.md:
-//! `cargo run --release -p ovtigre-tests --bin calibration -- [--runs N] [--looks N] [--replicates N] [--reference N]
+//! `cargo run --release -p ovtigre-tests --bin calibration -- [--runs N] [--side N] [--looks N] [--replicates N] [--reference N]
 //! [--seed N] [--threads N] [--case NAME]`.
 
 use anyhow::{Context as _, bail};
@@ -7,7 +7,7 @@ use ovtigre_tests::calibration::{Plan, calibrate, cases};
 use std::io::Write as _;
 
 fn main() -> anyhow::Result<()> {
-    let mut plan = Plan { runs: 200, looks: 7, replicates: 4, reference: 100, seed: 0 };
+    let mut plan = Plan { runs: 200, side: 32, looks: 7, replicates: 4, reference: 100, seed: 0 };
     let (mut threads, mut only) = (0, None);
     let mut arguments = std::env::args().skip(1);
     while let Some(flag) = arguments.next() {
@@ -15,6 +15,7 @@ fn main() -> anyhow::Result<()> {
         let number = || value.parse::<u32>().with_context(|| format!("{flag} {value}"));
         match flag.as_str() {
             "--runs" => plan.runs = number()?,
+            "--side" => plan.side = number()?,
             "--looks" => plan.looks = number()?,
             "--replicates" => plan.replicates = number()?,
             "--reference" => plan.reference = number()?,
