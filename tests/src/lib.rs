@@ -1,6 +1,7 @@
 //! What the tests share: scenes made by code, and renders of them without a farm.
 
 pub mod browser;
+pub mod calibration;
 pub mod clock;
 pub mod glb;
 pub mod irradiance;

@@ -29,6 +29,7 @@ mod submission;
 mod submit;
 mod table;
 mod token;
+mod truth;
 mod watch;
 mod words;
 mod work;

@@ -76,7 +76,7 @@ impl Farm {
             rays: progress.rays,
             invalid_samples: progress.invalid,
             workers,
-            error: curve.last().copied(),
+            error: curve.last().cloned(),
             error_target: spec.error_target,
             certified: row.certified,
             eta_seconds,
@@ -179,6 +179,6 @@ fn eta(row: &JobRow, progress: &Progress, spec: &JobSpec, curve: &[CurveRow]) ->
     let by_samples = (progress.samples > 0.0)
         .then(|| row.run_seconds * (asked - progress.samples).max(0.0) / progress.samples);
     let by_time = spec.seconds.map(|seconds| seconds - row.run_seconds);
-    let by_error = target_at(curve, spec, row).map(|at| at - row.run_seconds);
+    let by_error = target_at(curve, spec).map(|at| at - row.run_seconds);
     [by_samples, by_time, by_error].into_iter().flatten().map(|t| t.max(0.0)).min_by(f64::total_cmp)
 }
