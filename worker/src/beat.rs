@@ -39,12 +39,18 @@ pub struct Beat<'a> {
     pub beats: AtomicU64,
 }
 
+/// Whether who answers is no farm at all.
+fn is_strange(error: &ClientError) -> bool {
+    matches!(error, ClientError::Unexpected { status: None, .. })
+}
+
 impl Beat<'_> {
     /// Beats until the farm refuses this worker. A farm that does not answer is waited for.
     pub async fn run(&self) -> WorkerError {
         let mut backoff = self.client.backoff();
         let mut complained: Option<Instant> = None;
         loop {
+            let known = self.id.borrow().is_some();
             let wait = match self.once().await {
                 Ok(interval) => {
                     if complained.take().is_some() {
@@ -63,7 +69,8 @@ impl Beat<'_> {
                     self.id.send_replace(None);
                     Duration::ZERO
                 }
-                Err(error) if error.may_pass() => {
+                // Something else may stand for a moment where a farm stood that knew this worker.
+                Err(error) if error.may_pass() || known && is_strange(&error) => {
                     if complained.is_none_or(|at| at.elapsed() > COMPLAINT) {
                         tracing::warn!(%error, "trying again");
                         complained = Some(Instant::now());

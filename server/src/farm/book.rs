@@ -308,11 +308,6 @@ impl Book {
     pub fn waiting(&self) -> u64 {
         self.jobs.values().filter(|e| e.hand_out == HandOut::Yes).map(|e| e.plan.waiting()).sum()
     }
-
-    /// Batches in workers' hands.
-    pub fn leased(&self) -> u64 {
-        self.leases.len() as u64
-    }
 }
 
 impl Entry {

@@ -93,6 +93,7 @@ impl Farm {
         } else {
             self.blobs.delete_all(&BlobFolder::Incoming).await?;
         }
+        self.blobs.delete_older(&BlobFolder::AllParts, UPLOAD_MAX).await?;
         for id in self.blobs.jobs().await? {
             match self.store.job(&id).await? {
                 None => self.blobs.delete_all(&BlobFolder::Job(id)).await?,

@@ -95,6 +95,7 @@ impl Farm {
     /// Forgets idempotency keys, and uploads that were cut off.
     async fn forget_old(&self) -> Result<()> {
         self.store.forget_keys(self.rules.keys).await?;
+        self.blobs.delete_older(&BlobFolder::AllParts, UPLOAD_MAX).await?;
         Ok(self.blobs.delete_older(&BlobFolder::Incoming, UPLOAD_MAX).await?)
     }
 

@@ -98,6 +98,12 @@ impl Farm {
             key: format!("{}/{key}", owner.as_deref().unwrap_or_default()),
             fingerprint: blake3::hash(&asked).to_hex().to_string(),
         });
+        // A job that was taken before is told of, also where no further one would be taken.
+        if let Some(key) = &key
+            && let Some(before) = self.store.keyed(key).await?
+        {
+            return self.taken_before(before).await;
+        }
         self.need_room()?;
         let mut spec = self.check(request).await?;
         self.has_room_for(owner.as_deref())?;
@@ -122,8 +128,14 @@ impl Farm {
                 self.take_up(&row).await?;
                 self.status_of(&row).await
             }
+            before => self.taken_before(before).await,
+        }
+    }
+
+    async fn taken_before(&self, before: Added) -> Result<JobStatus> {
+        match before {
+            Added::New | Added::KeyTaken => Err(FarmError::KeyTaken),
             Added::Before(id) => self.status(&id).await,
-            Added::KeyTaken => Err(FarmError::KeyTaken),
         }
     }
 }

@@ -92,7 +92,7 @@ async fn a_silent_worker_is_lost_and_comes_back_by_speaking() {
     let worker = bench.worker().await;
     sleep(400).await;
     assert_eq!(bench.farm.worker(&worker).await.unwrap().state, WorkerState::Lost);
-    assert_eq!(bench.farm.scaling().active_workers, 0);
+    assert_eq!(bench.farm.scaling().await.unwrap().active_workers, 0);
     bench.take(&worker, 1).await;
     assert_eq!(bench.farm.worker(&worker).await.unwrap().state, WorkerState::Active);
 }
