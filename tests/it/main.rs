@@ -14,6 +14,7 @@ mod motion;
 mod photons;
 mod radiosity;
 mod same_bits;
+mod stability;
 mod techniques;
 mod tidy;
 mod weights;

@@ -9,5 +9,6 @@ pub mod room;
 pub mod scenes;
 pub mod services;
 pub mod showcase;
+pub mod stability;
 pub mod stage;
 pub mod textures;
