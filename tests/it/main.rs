@@ -19,6 +19,7 @@ mod page;
 mod photons;
 mod radiosity;
 mod same_bits;
+mod stability;
 mod techniques;
 mod tidy;
 mod weights;

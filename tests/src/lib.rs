@@ -13,6 +13,7 @@ pub mod room;
 pub mod scenes;
 pub mod services;
 pub mod showcase;
+pub mod stability;
 pub mod stage;
 pub mod tended;
 pub mod textures;
