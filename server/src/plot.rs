@@ -30,6 +30,8 @@ pub struct Trace {
     pub estimated: Vec<[f64; 2]>,
     /// What they are at most.
     pub upper: Vec<[f64; 2]>,
+    /// Those of the estimates that are not certified, whatever they are at most.
+    pub doubted: Vec<[f64; 2]>,
     /// Errors against a reference.
     pub truth: Vec<[f64; 2]>,
     /// Slope of log error over log time.
@@ -46,6 +48,7 @@ impl Trace {
             name: name.to_owned(),
             estimated: points(|row| row.relative_error),
             upper: points(|row| row.relative_error_upper),
+            doubted: points(|row| row.relative_error.filter(|_| row.doubt.is_some())),
             truth: Vec::new(),
             slope: curve.slope,
         }
@@ -57,7 +60,7 @@ impl Trace {
     }
 }
 
-/// The picture: for each trace its estimates, a band up to what they are at most, the fitted slope (dashed) and the error against
+/// The picture: for each trace its estimates (hollow where they are not certified), a band up to what they are at most, the fitted slope (dashed) and the error against
 /// the reference (crosses); the target is a line across.
 pub fn svg(title: &str, traces: &[Trace], target: Option<f64>) -> String {
     let mut text = String::new();
@@ -81,7 +84,7 @@ fn draw(backend: SVGBackend<'_>, title: &str, traces: &[Trace], target: Option<f
     let mut mesh = chart.configure_mesh();
     mesh.x_desc("run time in seconds").y_desc("relative error").label_style(("sans-serif", 14));
     mesh.light_line_style(RGBColor(238, 238, 238)).bold_line_style(RGBColor(215, 215, 215));
-    mesh.x_label_formatter(&number).y_label_formatter(&number).draw()?;
+    mesh.max_light_lines(3).x_labels(8).x_label_formatter(&number).y_label_formatter(&number).draw()?;
     if let Some(target) = target {
         let line = LineSeries::new([(times[0], target), (times[1], target)], TARGET.stroke_width(2));
         chart
@@ -112,7 +115,9 @@ fn draw_trace<'a>(chart: &mut Chart<'a, '_>, trace: &Trace, colour: RGBColor) ->
         .draw_series(LineSeries::new(estimated.iter().copied(), colour.stroke_width(2)))?
         .label(trace.name.clone())
         .legend(move |(x, y)| PathElement::new([(x, y), (x + 20, y)], colour.stroke_width(2)));
-    chart.draw_series(estimated.iter().map(|point| Circle::new(*point, 3, colour.filled())))?;
+    chart.draw_series(estimated.iter().map(|point| Circle::new(*point, 4, colour.filled())))?;
+    let doubted = positive(&trace.doubted);
+    chart.draw_series(doubted.into_iter().map(|point| Circle::new(point, 3, WHITE.filled())))?;
     if let Some((slope, line)) = trace.slope.and_then(|slope| Some((slope, fit(&estimated, slope)?))) {
         let line = DashedLineSeries::new(line, 7, 5, colour.mix(0.7).stroke_width(1));
         chart
@@ -171,6 +176,7 @@ mod tests {
             name: "room <path>".to_owned(),
             estimated: points(0.1),
             upper: points(0.13),
+            doubted: Vec::new(),
             truth: points(0.105),
             slope: Some(-0.5),
         }

@@ -10,13 +10,15 @@ use ovtigre_core::{
     film::{
         append::Prefix,
         batch::{Batch, Block},
-        certificate::level,
+        certificate::{self, level},
         error::estimate,
         estimate::picture,
         reference::Reference,
     },
+    gltf::limits::Limits,
     render::{
         batch::render,
+        inspect::{by_chance, inspect},
         prepare::{Prepared, prepare},
         progress::Progress,
     },
@@ -108,9 +110,11 @@ pub fn calibrate(case: &Case, plan: Plan) -> Calibration {
     let mut lanes = lanes(&settings);
     append(&other, &settings, &mut lanes, Block { index: 0, start: 0, count: samples });
     let reference = Reference::of_picture(&picture(settings.size, settings.size.frame(), &lanes));
+    let contents = inspect(case.glb.as_slice(), &Limits::default()).expect("a scene that can be read");
+    let by_chance = by_chance(case.method, contents.letters, contents.brightest);
     let run = |run: u32| {
         let settings = Settings { seed: plan.seed + u64::from(run), ..first.clone() };
-        looks(&prepared, &settings, plan.looks, &reference)
+        looks(&prepared, &settings, plan.looks, by_chance, &reference)
     };
     let runs = (0..plan.runs).into_par_iter().map(run).collect();
     Calibration { plan, own: reference.own_error(), runs }
@@ -128,14 +132,21 @@ fn append(prepared: &Prepared, settings: &Settings, lanes: &mut [Vec<Prefix>], b
     }
 }
 
-fn looks(prepared: &Prepared, settings: &Settings, looks: u32, reference: &Reference) -> Vec<Look> {
+fn looks(
+    prepared: &Prepared,
+    settings: &Settings,
+    looks: u32,
+    by_chance: Option<f64>,
+    reference: &Reference,
+) -> Vec<Look> {
     let mut lanes = lanes(settings);
     let region = settings.size.frame();
     (0..looks)
         .map(|index| {
             let start = if index == 0 { 0 } else { 1 << (index - 1) };
             append(prepared, settings, &mut lanes, Block { index, start, count: start.max(1) });
-            let found = estimate(region, &lanes, index + 1).expect("there are replicates");
+            let found = estimate(region, &lanes, certificate::Look { number: index + 1, by_chance })
+                .expect("there are replicates");
             Look {
                 truth: reference.relative_error(&picture(settings.size, region, &lanes).planes[0]),
                 relative: found.relative,
@@ -153,11 +164,16 @@ fn median(of: impl Iterator<Item = f64>) -> f64 {
 }
 
 impl Calibration {
-    /// Renders whose error is not doubted at a look, and those of them whose error is at most what is said.
-    pub fn covered(&self, look: u32) -> [usize; 2] {
+    /// Renders whose error is not doubted at a look, and those of them whose error is more than what is said.
+    pub fn wrong(&self, look: u32) -> [usize; 2] {
         let at = self.runs.iter().map(|run| run[look as usize]).filter(|look| !look.doubted);
         let believed: Vec<Look> = at.collect();
-        [believed.len(), believed.iter().filter(|look| look.truth <= look.upper).count()]
+        [believed.len(), believed.iter().filter(|look| look.truth > look.upper).count()]
+    }
+
+    /// Renders whose error is at most what is said, whether that is doubted or not.
+    pub fn covered_in_all(&self, look: u32) -> usize {
+        self.runs.iter().map(|run| run[look as usize]).filter(|look| look.truth <= look.upper).count()
     }
 
     /// Renders that a target stops, and those of them whose error is at most the target.
@@ -173,7 +189,7 @@ impl Calibration {
         let name = case.name;
         for look in 0..self.plan.looks {
             let at = || self.runs.iter().map(|run| run[look as usize]);
-            let [believed, covered] = self.covered(look);
+            let [believed, wrong] = self.wrong(look);
             let samples = self.plan.replicates << look;
             let [truth, relative, upper] = [
                 median(at().map(|l| l.truth)),
@@ -181,18 +197,24 @@ impl Calibration {
                 median(at().map(|l| l.upper)),
             ];
             let doubted = self.runs.len() - believed;
-            let claim = 100.0 * (1.0 - level(look + 1));
-            let share = percent(covered, believed);
+            let claim = 100.0 * level(look + 1);
+            let share = percent(wrong, self.runs.len());
+            let all = percent(self.covered_in_all(look), self.runs.len());
             let row = format!(
-                "| {name} | {samples} | {truth:.4} | {relative:.4} | {upper:.4} | {doubted} | {covered} of {believed} | {share} | {claim:.2} % |"
+                "| {name} | {samples} | {truth:.4} | {relative:.4} | {upper:.4} | {doubted} | {wrong} | {share} | {claim:.2} % | {all} |"
             );
             writeln!(coverage, "{row}").expect("writing to a string cannot fail");
         }
         for target in TARGETS {
             let [stopped, right] = self.stopped(target);
             if stopped > 0 {
-                writeln!(stops, "| {name} | {target} | {stopped} | {right} | {} |", percent(right, stopped))
-                    .expect("writing to a string cannot fail");
+                let (wrong, all) = (stopped - right, self.runs.len());
+                writeln!(
+                    stops,
+                    "| {name} | {target} | {stopped} of {all} | {wrong} | {} |",
+                    percent(wrong, all)
+                )
+                .expect("writing to a string cannot fail");
             }
         }
         [coverage, stops]

@@ -3,6 +3,7 @@
 use ovtigre_core::{
     film::{
         append::Prefix,
+        certificate::Look,
         error::{ErrorEstimate, estimate},
         estimate::{Picture, picture},
         schedule::Schedule,
@@ -114,7 +115,7 @@ impl Rendered {
 
     /// The error of the whole picture.
     pub fn error(&self) -> ErrorEstimate {
-        estimate(self.settings.size.frame(), &self.prefixes, 1).expect("more than one replicate")
+        estimate(self.settings.size.frame(), &self.prefixes, Look::at(1)).expect("more than one replicate")
     }
 
     /// Samples dropped.

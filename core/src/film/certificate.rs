@@ -15,11 +15,28 @@ pub const FALSE_STOP_PROBABILITY: f64 = 0.05;
 const EFFECTIVE_PIXELS: f64 = 16.0;
 /// Share of the error that may come from pixels whose light one replicate brought alone. A spike that is met by one of
 /// R replicates only says that others like it are not met yet. Of normal noise in four replicates it is 0.07.
-const LONE_SHARE: f64 = 0.75;
+const LONE_SHARE: f64 = 0.9;
 /// Part of a pixel's squared deviations, of the (R−1)/R that are possible, from which on one replicate has them alone.
 const LONE: f64 = 0.93;
 /// Pixels that a doubt names, at most.
 const CULPRITS: usize = 8;
+
+/// A look at a picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Look {
+    /// Its number, from 1.
+    pub number: u32,
+    /// The brightest that a sample can be which meets a light by chance only, such as through glass after a diffuse
+    /// scattering; `None` where every light is looked for.
+    pub by_chance: Option<f64>,
+}
+
+impl Look {
+    /// A look where nothing is met by chance only.
+    pub fn at(number: u32) -> Self {
+        Self { number, by_chance: None }
+    }
+}
 
 /// What is known of the error, beside its estimate.
 #[derive(Clone, Debug, PartialEq)]
@@ -92,7 +109,7 @@ pub struct Culprit {
 }
 
 /// The certificate of `replicates`, each the means of `region`'s pixels, three channels a pixel; `square` is the squared
-/// relative error as it is reported. Needs three replicates. `look` counts the checkpoints from 1.
+/// relative error as it is reported, `samples` how many a pixel has. Needs three replicates.
 ///
 /// Replicate r is compared with the mean o of the others: `q_r = (R−1)/R² · mean over p of [Σ_c (x_r − o)² / 3] / (Y² + ε Ȳ²)`,
 /// Y and Ȳ of the others, too. What r alone has found is thus not hidden by the brightness that it brings itself. The mean C of the
@@ -100,11 +117,19 @@ pub struct Culprit {
 /// their squares' variance is R · Var(C), and Var(C) is (R−1)/(R−2) · s²/R, s the standard deviation of the q_r. On the
 /// logarithm, as squares are not symmetric, `upper² = C · exp(t · s/C · √((R−1)/(R−2)))`, t Student's with R − 1 degrees
 /// of freedom at 6α/(π²k²) for the k-th look.
+///
+/// Light that is met by chance only may not have been met at all, and then no replicate knows of it. What has not happened in n
+/// samples of each of P pixels has, but for a probability a, an expectation of at most ln(1/a) times. The light that
+/// this leaves out is M = ln(1/a) S/n, S the brightest that a sample can be. All in one pixel of the mean weight it is a
+/// squared error of M² · mean of 1 / (Y² + ε Ȳ²) / P. But it is part of Y, too: over K pixels it is K (M/K)² / ((M/K)² + ε Ȳ²) / P,
+/// M / (2 √ε Ȳ P) at most, and 81/P in one pixel, as that is a ninth of its Y. Both bounds then have half of the
+/// look's probability each.
 pub(super) fn certificate(
     region: Region,
     replicates: &[&[f64]],
     square: f64,
-    look: u32,
+    samples: f64,
+    look: Look,
 ) -> Option<Certificate> {
     if replicates.len() < 3 {
         return None;
@@ -112,13 +137,20 @@ pub(super) fn certificate(
     let crossed = Crossed::new(region, replicates);
     let r = replicates.len() as f64;
     let centre = crossed.of_replicates.iter().sum::<f64>() / r;
+    let parts = if look.by_chance.is_some() { 0.5 } else { 1.0 };
+    let alpha = parts * level(look.number);
+    let unseen = look.by_chance.map_or(0.0, |brightest| {
+        let light = -libm::log(alpha) / samples * brightest;
+        let most = (light / (2.0 * EPSILON.sqrt() * crossed.mean)).max(81.0);
+        (light * light * crossed.weight).min(most) / region.pixels() as f64
+    });
     if centre == 0.0 {
-        return Some(Certificate { upper: square.sqrt(), doubt: None });
+        return Some(Certificate { upper: (square + unseen).sqrt(), doubt: None });
     }
     let spread = crossed.of_replicates.iter().map(|q| (q - centre) * (q - centre)).sum::<f64>() / (r - 1.0);
     let deviation = (spread * (r - 1.0) / (r - 2.0)).sqrt() / centre;
-    let t = student_t_upper(level(look), replicates.len() as u32 - 1);
-    let upper = (square.max(centre) * libm::exp(t * deviation)).sqrt();
+    let t = student_t_upper(alpha, replicates.len() as u32 - 1);
+    let upper = (square.max(centre) * libm::exp(t * deviation) + unseen).sqrt();
     Some(Certificate { upper, doubt: crossed.doubt(region, replicates.len()) })
 }
 
@@ -136,6 +168,10 @@ struct Crossed {
     of_pixels: Vec<f64>,
     /// Whether one replicate has a pixel's deviations alone, upwards.
     lone: Vec<bool>,
+    /// Mean over the pixels of 1 / (Y² + ε Ȳ²), of all replicates together.
+    weight: f64,
+    /// Ȳ of all replicates together.
+    mean: f64,
 }
 
 impl Crossed {
@@ -165,7 +201,11 @@ impl Crossed {
         };
         let of_replicates = replicates.iter().map(one).collect();
         let lone = (0..pixels).map(|pixel| is_lone(replicates, &total, pixel)).collect();
-        Self { of_replicates, of_pixels, lone }
+        let mean = all.mean / r;
+        let floor = EPSILON * mean * mean;
+        let weights = all.local.iter().map(|sum| 1.0 / ((sum / r).powi(2) + floor));
+        let weight = weights.sum::<f64>() / pixels as f64;
+        Self { of_replicates, of_pixels, lone, weight, mean }
     }
 
     fn doubt(&self, region: Region, replicates: usize) -> Option<Doubt> {
@@ -275,7 +315,7 @@ mod tests {
 
     fn of(replicates: &[Vec<f64>]) -> Certificate {
         let all: Vec<&[f64]> = replicates.iter().map(Vec::as_slice).collect();
-        certificate(REGION, &all, 0.0, 1).unwrap()
+        certificate(REGION, &all, 0.0, 1.0, Look::at(1)).unwrap()
     }
 
     /// Relative error against the true picture, which is 1 everywhere.
@@ -374,6 +414,25 @@ mod tests {
         assert_eq!(doubt.cause, Cause::FewPixels);
         assert_eq!((doubt.pixels[0].x, doubt.pixels[0].y), (109, 55));
         assert!(doubt.pixels[0].share > 0.99 && doubt.pixels.len() == CULPRITS, "{doubt:?}");
+    }
+
+    #[test]
+    fn light_that_may_not_have_been_met_counts() {
+        // No replicate differs: all that is left is what was not met in 64 samples of each pixel, of 8 each.
+        let replicates = grey(4, || vec![1.0; PIXELS]);
+        let all: Vec<&[f64]> = replicates.iter().map(Vec::as_slice).collect();
+        let upper = |brightest| {
+            let look = Look { number: 1, by_chance: Some(brightest) };
+            certificate(REGION, &all, 0.0, 64.0, look).unwrap().upper
+        };
+        let light = (2.0 / level(1)).ln() / 64.0;
+        let alone = 8.0 * light / 16.0 / 1.01_f64.sqrt();
+        assert!((upper(8.0) / alone - 1.0).abs() < 1e-12, "{alone}");
+        // Brighter light would be seen in the local mean, too.
+        assert!((upper(200.0) - 9.0 / 16.0).abs() < 1e-12);
+        let spread = (1e6 * light * 5.0).sqrt() / 16.0;
+        assert!((upper(1e6) / spread - 1.0).abs() < 1e-12, "{spread}");
+        assert_eq!(of(&replicates).upper, 0.0);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::{
     append::Prefix,
-    certificate::{Doubt, certificate},
+    certificate::{Doubt, Look, certificate},
     size::Region,
 };
 
@@ -23,13 +23,15 @@ pub struct ErrorEstimate {
 }
 
 /// The error of `prefixes[region][replicate]`, whose regions are bands that cover `region`; `None`
-/// for a single replicate or where a replicate has no samples. `look` counts the checkpoints from 1: what the error is at
+/// for a single replicate or where a replicate has no samples. What the error is at
 /// most is looked up with the probability that this look may spend ([`super::certificate::level`]).
-pub fn estimate(region: Region, prefixes: &[Vec<Prefix>], look: u32) -> Option<ErrorEstimate> {
+pub fn estimate(region: Region, prefixes: &[Vec<Prefix>], look: Look) -> Option<ErrorEstimate> {
     let replicates = replicate_means(prefixes, 0)?;
     let all: Vec<&[f64]> = replicates.iter().map(Vec::as_slice).collect();
     let (rms, relative) = mean_squares(region, &all);
-    let certificate = certificate(region, &all, relative, look);
+    let of_region = |replicates: &Vec<Prefix>| replicates.iter().map(|p| f64::from(p.samples())).sum::<f64>();
+    let samples = prefixes.iter().map(of_region).fold(f64::INFINITY, f64::min);
+    let certificate = certificate(region, &all, relative, samples, look);
     Some(ErrorEstimate {
         rms: rms.sqrt(),
         relative: relative.sqrt(),
@@ -169,7 +171,7 @@ mod tests {
     #[test]
     fn the_rms_error_of_uniform_noise_is_known_and_does_not_change_with_exposure() {
         let size = Size { width: 64, height: 64 };
-        let e = estimate(size.frame(), &prefixes(size, 4, &mut 7), 1).unwrap();
+        let e = estimate(size.frame(), &prefixes(size, 4, &mut 7), Look::at(1)).unwrap();
         // σ² of the mean of 4: 1/48. 12288 estimates with 3 degrees of freedom: 0.74 % of σ² a standard deviation.
         let expected = (1.0_f64 / 48.0).sqrt();
         assert!((e.rms / expected - 1.0).abs() < 0.012, "{e:?}");
@@ -191,7 +193,7 @@ mod tests {
         });
         let prefixes = vec![one.collect()];
         let [whole, layer] = [0, 1].map(|plane| summarise(size.frame(), &prefixes, plane));
-        let all = estimate(size.frame(), &prefixes, 1).unwrap();
+        let all = estimate(size.frame(), &prefixes, Look::at(1)).unwrap();
         assert_eq!((whole.rms, whole.relative), (Some(all.rms), Some(all.relative)));
         // A power of two changes no bit.
         assert_eq!(layer.mean_luminance, 0.125 * whole.mean_luminance);
@@ -203,8 +205,11 @@ mod tests {
     #[test]
     fn one_replicate_has_no_error_and_two_have_no_interval() {
         let size = Size { width: 4, height: 4 };
-        assert_eq!(estimate(size.frame(), &prefixes(size, 1, &mut 3), 1), None);
-        assert_eq!(estimate(size.frame(), &prefixes(size, 2, &mut 3), 1).unwrap().relative_upper, None);
+        assert_eq!(estimate(size.frame(), &prefixes(size, 1, &mut 3), Look::at(1)), None);
+        assert_eq!(
+            estimate(size.frame(), &prefixes(size, 2, &mut 3), Look::at(1)).unwrap().relative_upper,
+            None
+        );
     }
 
     #[test]

@@ -9,7 +9,10 @@ use super::{
 };
 use crate::{fail_point::FailPoint, store::row::NewCheckpoint};
 use ovtigre_core::{
-    film::error::{ErrorEstimate, PlaneSummary, estimate, summarise},
+    film::{
+        certificate::Look,
+        error::{ErrorEstimate, PlaneSummary, estimate, summarise},
+    },
     settings::Shows,
 };
 use ovtigre_proto::{
@@ -119,13 +122,14 @@ struct Measured {
 
 /// The errors of what is appended. An estimate that is not finite is none.
 async fn measure(live: &Live, held: Held) -> Result<(Held, Measured)> {
-    let region = live.spec.region;
+    let (region, by_chance) = (live.spec.region, live.spec.by_chance);
     let planes = live.spec.settings.planes() as usize;
     let narrow = live.spec.settings.layers.iter().position(|layer| layer.shows == Shows::Narrow);
     let narrow = narrow.map(|layer| layer + 1);
     blocking(move || {
         let merge = held.as_ref().expect("loaded by the caller");
-        let found = estimate(region, &merge.prefixes, merge.checkpoints + 1);
+        let look = Look { number: merge.checkpoints + 1, by_chance };
+        let found = estimate(region, &merge.prefixes, look);
         let found = found.filter(|e| e.rms.is_finite() && e.relative.is_finite());
         let found = found.map(|e| ErrorEstimate {
             relative_upper: e.relative_upper.filter(|upper| upper.is_finite()),

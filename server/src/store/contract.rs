@@ -92,7 +92,7 @@ pub(crate) async fn run<F: Future<Output = Arc<dyn Store>>>(open: impl Fn() -> F
 }
 
 async fn scenes_are_remembered_once(store: &dyn Store) {
-    let content = SceneContent::Environment { width: 4, height: 2 };
+    let content = SceneContent::Environment { width: 4, height: 2, brightest: 2.5 };
     let report = SceneReport { id: hash(1), bytes: 77, content };
     store.add_scene(report.clone()).await.unwrap();
     store.add_scene(SceneReport { bytes: 78, ..report.clone() }).await.unwrap();

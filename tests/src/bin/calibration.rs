@@ -36,10 +36,12 @@ fn main() -> anyhow::Result<()> {
         stops += &stopped;
     }
     let mut out = std::io::stdout().lock();
-    let head =
-        "| case | samples | true error | relative error | at most | doubted | covered | share | claimed |";
-    writeln!(out, "{head}\n| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n{coverage}")?;
-    let head = "| case | target | stopped | true error under it | share |";
+    let head = "| case | samples | true error | relative error | at most | doubted | certified too low | of all | claimed, at most | covered, the doubted too |";
+    writeln!(
+        out,
+        "{head}\n| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n{coverage}"
+    )?;
+    let head = "| case | target | stopped | above the target | of all |";
     writeln!(out, "{head}\n| --- | ---: | ---: | ---: | ---: |\n{stops}")?;
     Ok(())
 }
