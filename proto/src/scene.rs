@@ -37,6 +37,9 @@ pub enum SceneContent {
         width: u32,
         /// Rows.
         height: u32,
+        /// The largest radiance that a channel of it has, in W/(sr·m²).
+        #[serde(default)]
+        brightest: f64,
     },
 }
 
@@ -75,6 +78,9 @@ pub struct SceneContents {
     /// Letters that its surfaces can have: `D`, `S` (glossy), `S_M`.
     #[serde(default)]
     pub letters: Vec<String>,
+    /// The largest radiance that a channel of an emissive surface or of the default sky has, in W/(sr·m²).
+    #[serde(default)]
+    pub brightest: f64,
     /// What a render of it needs.
     pub needs: Vec<String>,
     /// What a render of it leaves out.

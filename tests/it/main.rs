@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on panics")]
 
 mod bad_input;
+mod calibration;
 mod caustics;
 mod chaos;
 mod closed_forms;
@@ -15,9 +16,11 @@ mod hostile;
 mod lens;
 mod methods;
 mod motion;
+mod page;
 mod photons;
 mod radiosity;
 mod same_bits;
+mod stability;
 mod techniques;
 mod tidy;
 mod tls;

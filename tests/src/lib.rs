@@ -1,5 +1,7 @@
 //! What the tests share: scenes made by code, and renders of them without a farm.
 
+pub mod browser;
+pub mod calibration;
 pub mod clock;
 pub mod glb;
 pub mod hostile;
@@ -13,6 +15,7 @@ pub mod room;
 pub mod scenes;
 pub mod services;
 pub mod showcase;
+pub mod stability;
 pub mod stage;
 pub mod tended;
 pub mod textures;

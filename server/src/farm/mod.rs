@@ -21,6 +21,7 @@ pub mod others;
 pub mod parts;
 pub mod paths;
 pub mod picture;
+pub mod pixel;
 pub mod reach;
 pub mod reap;
 pub mod rules;
@@ -73,6 +74,7 @@ pub struct Farm {
     inspect: Inspect,
     ids: Ids,
     fullness: space::Fullness,
+    shown: picture::Shown,
     tasks: TaskTracker,
     decoders: tokio::sync::Semaphore,
     inspectors: tokio::sync::Semaphore,

@@ -48,6 +48,7 @@ impl Farm {
             stopping: tokio_util::sync::CancellationToken::new(),
             inspect,
             fullness: super::space::Fullness::default(),
+            shown: super::picture::Shown::default(),
             ids,
             tasks: tokio_util::task::TaskTracker::new(),
             decoders: Semaphore::new(processors),

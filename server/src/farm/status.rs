@@ -27,15 +27,10 @@ impl Farm {
         self.status_of(&row).await
     }
 
-    /// Jobs, the newest first; `before` is where the last page ended.
-    pub async fn jobs(
-        &self,
-        state: Option<JobState>,
-        before: Option<i64>,
-        limit: u32,
-    ) -> Result<Page<JobStatus>> {
-        let limit = limit.clamp(1, PAGE_MAX);
-        let mut rows = self.store.jobs(JobFilter { state, before, limit: limit + 1 }).await?;
+    /// Jobs, the newest first.
+    pub async fn jobs(&self, filter: JobFilter) -> Result<Page<JobStatus>> {
+        let limit = filter.limit.clamp(1, PAGE_MAX);
+        let mut rows = self.store.jobs(JobFilter { limit: limit + 1, ..filter }).await?;
         let more = rows.len() > limit as usize;
         rows.truncate(limit as usize);
         let next = rows.last().filter(|_| more).map(|row| row.sequence.to_string());
@@ -81,7 +76,7 @@ impl Farm {
             rays: progress.rays,
             invalid_samples: progress.invalid,
             workers,
-            error: curve.last().copied(),
+            error: curve.last().cloned(),
             error_target: spec.error_target,
             certified: row.certified,
             eta_seconds,
@@ -191,6 +186,6 @@ fn eta(row: &JobRow, progress: &Progress, spec: &JobSpec, curve: &[CurveRow]) ->
     let by_samples = (progress.samples > 0.0)
         .then(|| row.run_seconds * (asked - progress.samples).max(0.0) / progress.samples);
     let by_time = spec.seconds.map(|seconds| seconds - row.run_seconds);
-    let by_error = target_at(curve, spec, row).map(|at| at - row.run_seconds);
+    let by_error = target_at(curve, spec).map(|at| at - row.run_seconds);
     [by_samples, by_time, by_error].into_iter().flatten().map(|t| t.max(0.0)).min_by(f64::total_cmp)
 }

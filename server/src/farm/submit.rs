@@ -4,7 +4,7 @@ use super::{
     Farm,
     error::{FarmError, Result, fault},
     paths::choose,
-    reach::{DEFAULT_SKY, line, missing},
+    reach::{DEFAULT_SKY, letters, line, missing},
     rules::{PARTIAL_BYTES_MAX, Rules},
     spec::JobSpec,
 };
@@ -14,6 +14,7 @@ use crate::{
 };
 use ovtigre_core::{
     film::size::{Region, Size},
+    render::inspect::by_chance,
     settings::{CameraChoice, Environment, EnvironmentSource, Lens, Settings, Shutter},
 };
 use ovtigre_proto::{
@@ -46,7 +47,7 @@ impl Farm {
     pub async fn check(&self, request: JobRequest) -> Result<JobSpec> {
         let scene = request.scene.clone();
         let scene = scene.ok_or_else(|| FarmError::Request(vec![fault("/scene", "'scene' is required")]))?;
-        let contents = match self.upload_at("/scene", &scene).await?.content {
+        let mut contents = match self.upload_at("/scene", &scene).await?.content {
             SceneContent::Scene(contents) => contents,
             SceneContent::Environment { .. } => {
                 let detail =
@@ -54,11 +55,21 @@ impl Farm {
                 return Err(FarmError::Request(vec![fault("/scene", detail)]));
             }
         };
-        if let Some(EnvironmentRequest::Image(id)) = &request.environment
-            && let SceneContent::Scene(_) = self.upload_at("/environment", id).await?.content
-        {
-            let detail = format!("'{id}' is a scene: give an uploaded image here");
-            return Err(FarmError::Request(vec![fault("/environment", detail)]));
+        match &request.environment {
+            None => {}
+            Some(EnvironmentRequest::Uniform(radiance)) => {
+                contents.brightest =
+                    radiance.iter().copied().map(f64::from).fold(contents.brightest, f64::max);
+            }
+            Some(EnvironmentRequest::Image(id)) => match self.upload_at("/environment", id).await?.content {
+                SceneContent::Environment { brightest, .. } => {
+                    contents.brightest = contents.brightest.max(brightest);
+                }
+                SceneContent::Scene(_) => {
+                    let detail = format!("'{id}' is a scene: give an uploaded image here");
+                    return Err(FarmError::Request(vec![fault("/environment", detail)]));
+                }
+            },
         }
         resolve(request, &contents, &self.rules).map_err(FarmError::Request)
     }
@@ -219,6 +230,7 @@ pub fn resolve(
         seconds: request.seconds,
         build: rules.build.to_owned(),
         owner: None,
+        by_chance: by_chance(chosen.method, letters(scene), scene.brightest),
         method_reason: chosen.reason.to_owned(),
         unreachable,
         warnings,

@@ -82,6 +82,14 @@ pub(super) async fn get(db: &mut Db, id: &JobId) -> Result<Option<JobRow>> {
 pub(super) async fn list(db: &mut Db, filter: JobFilter) -> Result<Vec<JobRow>> {
     let now = db.now().await?;
     let before = filter.before.unwrap_or(i64::MAX);
+    if let Some(text) = filter.text {
+        let sql = "SELECT * FROM job WHERE sequence < $1 AND (state = $3 OR $3 = '')
+             AND (lower(name) LIKE $4 ESCAPE '\\' OR lower(id) LIKE $4 ESCAPE '\\')
+             ORDER BY sequence DESC LIMIT $2";
+        let state = filter.state.map_or("", JobState::name);
+        let rows = query(sql).bind(before).bind(filter.limit).bind(state).bind(pattern(&text));
+        return db.all(rows).await?.iter().map(|row| read(row, now)).collect();
+    }
     let rows = match filter.state {
         None => query("SELECT * FROM job WHERE sequence < $1 ORDER BY sequence DESC LIMIT $2").bind(before),
         Some(state) => {
@@ -91,6 +99,18 @@ pub(super) async fn list(db: &mut Db, filter: JobFilter) -> Result<Vec<JobRow>> 
         }
     };
     db.all(rows.bind(filter.limit)).await?.iter().map(|row| read(row, now)).collect()
+}
+
+/// What LIKE finds `text` with, wherever it is.
+fn pattern(text: &str) -> String {
+    let mut pattern = "%".to_owned();
+    for c in text.chars() {
+        if matches!(c, '%' | '_' | '\\') {
+            pattern.push('\\');
+        }
+        pattern.push(c.to_ascii_lowercase());
+    }
+    pattern + "%"
 }
 
 /// Jobs that are not over or have no last form, the oldest first.
