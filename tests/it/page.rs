@@ -180,7 +180,7 @@ fn jobs_are_listed_and_cancelled(browser: &Browser, farm: &Farm, job: &str) {
     for name in ["alpha", "beta"] {
         assert_eq!(browser.run(submit, &[json!(name), farm.job(job)["scene"].take()]), 202);
     }
-    browser.press("Jobs");
+    browser.click("nav a[data-view=jobs]");
     browser.until("document.querySelectorAll('.jobs-table tbody tr').length === 3");
     assert_eq!(browser.value("document.querySelectorAll('.jobs-table img').length"), 0);
     browser.until("document.querySelectorAll('.thumb canvas').length >= 1");
@@ -211,7 +211,7 @@ fn jobs_are_listed_and_cancelled(browser: &Browser, farm: &Farm, job: &str) {
 }
 
 fn workers_are_listed_and_drained(browser: &Browser) {
-    browser.press("Workers");
+    browser.click("nav a[data-view=workers]");
     browser.until("document.querySelector('table').textContent.includes('local-1')");
     browser.until("!document.querySelector('.numbers dd').textContent.includes('–')");
     seen(browser, "workers");
