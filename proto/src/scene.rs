@@ -4,6 +4,15 @@ use crate::id::BlobId;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+/// How much of a file that is uploaded in parts is there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct PartsReceived {
+    /// Bytes that are there from the first on, without a gap.
+    pub received: u64,
+    /// Bytes of the whole file.
+    pub bytes: u64,
+}
+
 /// What is in an uploaded file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SceneReport {
@@ -29,6 +38,9 @@ pub enum SceneContent {
         width: u32,
         /// Rows.
         height: u32,
+        /// The largest radiance that a channel of it has, in W/(sr·m²).
+        #[serde(default)]
+        brightest: f64,
     },
 }
 
@@ -67,6 +79,9 @@ pub struct SceneContents {
     /// Letters that its surfaces can have: `D`, `S` (glossy), `S_M`.
     #[serde(default)]
     pub letters: Vec<String>,
+    /// The largest radiance that a channel of an emissive surface or of the default sky has, in W/(sr·m²).
+    #[serde(default)]
+    pub brightest: f64,
     /// What a render of it needs.
     pub needs: Vec<String>,
     /// What a render of it leaves out.

@@ -21,7 +21,8 @@ pub fn inspect(limits: Limits) -> Inspect {
         if bytes.starts_with(EXR) || bytes.starts_with(RADIANCE) {
             let environment = Environment::decode(&bytes, 0.0).map_err(|e| fault("", e.to_string()))?;
             let (width, height) = environment.size();
-            return Ok(SceneContent::Environment { width: width as u32, height: height as u32 });
+            let brightest = environment.brightest().into();
+            return Ok(SceneContent::Environment { width: width as u32, height: height as u32, brightest });
         }
         let found = look(Arc::<[u8]>::from(&bytes[..]), &limits).map_err(|e| at_fault(&e))?;
         Ok(SceneContent::Scene(contents(found)))
@@ -35,7 +36,7 @@ fn at_fault(error: &LoadError) -> Fault {
 /// In the words of the wire.
 pub fn contents(found: Contents) -> SceneContents {
     let [point, spot, directional] = found.punctual;
-    let Contents { report, aspects, parallel, letters, needs, leaves_out, warnings, .. } = found;
+    let Contents { report, aspects, parallel, letters, brightest, needs, leaves_out, warnings, .. } = found;
     let aspects: Vec<Option<f64>> = aspects.into_iter().map(|a| a.map(f64::from)).collect();
     SceneContents {
         triangles: report.placed_triangles,
@@ -52,6 +53,7 @@ pub fn contents(found: Contents) -> SceneContents {
         lights: LightCounts { emissive_triangles: report.emissive_triangles, point, spot, directional },
         camera_rays_parallel: parallel,
         letters: letters.iter().map(|letter| letter.symbol().to_owned()).collect(),
+        brightest,
         needs,
         leaves_out,
         warnings: warnings

@@ -2,8 +2,10 @@
 
 pub mod api;
 pub mod blobs;
+pub mod fail_point;
 pub mod farm;
 pub mod inspect;
+pub mod plot;
 pub mod serve;
 pub mod store;
 pub mod tls;

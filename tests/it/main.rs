@@ -3,9 +3,13 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on panics")]
 
 mod bad_input;
+mod calibration;
 mod caustics;
+mod chaos;
 mod closed_forms;
+mod disk_full;
 mod expressions;
+mod fail_points;
 mod faults;
 mod gltf;
 mod lens;
@@ -15,6 +19,7 @@ mod page;
 mod photons;
 mod radiosity;
 mod same_bits;
+mod stability;
 mod techniques;
 mod tidy;
 mod weights;

@@ -250,6 +250,17 @@ fn folders_and_hashes_are_made_in_the_browser() {
         return [one.name, id === report.id, report.triangles, parts.at(-1), id === await hashOf(again.blob)];";
     let sent = browser.run(sent, &[json!(document.to_string()), json!(&glb[20 + length + 8..])]);
     assert_eq!(sent, json!(["lamp.zip", true, 4, 1, true]));
+    // A file in parts, of which one is there already.
+    let parts = "const { upload, send } = await import('/page/client.js'); const blob = new Blob([Uint8Array.from(a[0])]);
+        const path = `/v1/scenes/${a[1]}`; const size = Math.ceil(blob.size / 5);
+        await fetch(path, { method: 'PUT', body: blob.slice(0, size), headers: { 'content-range': `bytes 0-${size - 1}/${blob.size}` } });
+        const parts = []; const report = await upload(path, blob, (part) => parts.push(part), undefined, size);
+        return [report.id === a[1], parts.every((part) => part >= 0.2 || part === 0), parts.at(-1)];";
+    let mut longer = Glb::new();
+    add(&mut longer, "floor", lambert(0.5, 1.0), floor(0.0, 3.0, 0.0, 0.0));
+    let longer = longer.finish();
+    let sent = browser.run(parts, &[json!(longer), json!(blake3::hash(&longer).to_hex().as_str())]);
+    assert_eq!(sent, json!([true, true, 1]));
     // What is dropped is taken like what is chosen.
     browser.press("New job");
     let drop = "const transfer = new DataTransfer(); transfer.items.add(new File([Uint8Array.from(a[0])], 'lamp.glb'));

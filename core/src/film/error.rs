@@ -1,45 +1,43 @@
 //! The error of a whole picture from the spread between its replicates.
 
-use super::{append::Prefix, size::Region};
-use crate::math::quantile::student_t_upper;
+use super::{
+    append::Prefix,
+    certificate::{Doubt, Look, certificate},
+    size::Region,
+};
 
 /// Share of the picture's mean luminance that keeps black pixels from counting without bound.
 pub(super) const EPSILON: f64 = 0.01;
-/// Probability that a job is ever stopped too early, over all its checkpoints together.
-pub const FALSE_STOP_PROBABILITY: f64 = 0.05;
 
 /// Errors of a picture.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct ErrorEstimate {
     /// √(mean over pixels and channels of the variance of the mean).
     pub rms: f64,
     /// √(mean over pixels of `[Σ_c v / 3]` / (Y² + ε Ȳ²)), Y the 3×3 mean luminance.
     pub relative: f64,
-    /// Upper end of the interval of `relative`; needs three replicates.
+    /// What the relative error is at most; needs three replicates.
     pub relative_upper: Option<f64>,
+    /// Why that may not be believed.
+    pub doubt: Option<Doubt>,
 }
 
 /// The error of `prefixes[region][replicate]`, whose regions are bands that cover `region`; `None`
-/// for a single replicate or where a replicate has no samples. `look` counts the checkpoints from 1: the k-th look spends
-/// 6α/(π²k²) of the probability α of a false stop, so that all looks together spend α.
-///
-/// The interval is a jackknife over replicates: pixels may be correlated, replicates are not.
-pub fn estimate(region: Region, prefixes: &[Vec<Prefix>], look: u32) -> Option<ErrorEstimate> {
+/// for a single replicate or where a replicate has no samples. What the error is at
+/// most is looked up with the probability that this look may spend ([`super::certificate::level`]).
+pub fn estimate(region: Region, prefixes: &[Vec<Prefix>], look: Look) -> Option<ErrorEstimate> {
     let replicates = replicate_means(prefixes, 0)?;
-    let count = replicates.len();
     let all: Vec<&[f64]> = replicates.iter().map(Vec::as_slice).collect();
     let (rms, relative) = mean_squares(region, &all);
-    let relative_upper = (count >= 3).then(|| {
-        let pseudo_values: Vec<f64> = (0..count)
-            .map(|left_out| {
-                let rest: Vec<&[f64]> = (0..count).filter(|r| *r != left_out).map(|r| all[r]).collect();
-                let (_, without) = mean_squares(region, &rest);
-                count as f64 * relative - (count - 1) as f64 * without * (count - 1) as f64 / count as f64
-            })
-            .collect();
-        upper(relative, &pseudo_values, look).sqrt()
-    });
-    Some(ErrorEstimate { rms: rms.sqrt(), relative: relative.sqrt(), relative_upper })
+    let of_region = |replicates: &Vec<Prefix>| replicates.iter().map(|p| f64::from(p.samples())).sum::<f64>();
+    let samples = prefixes.iter().map(of_region).fold(f64::INFINITY, f64::min);
+    let certificate = certificate(region, &all, relative, samples, look);
+    Some(ErrorEstimate {
+        rms: rms.sqrt(),
+        relative: relative.sqrt(),
+        relative_upper: certificate.as_ref().map(|c| c.upper),
+        doubt: certificate.and_then(|c| c.doubt),
+    })
 }
 
 /// One plane of a picture, as a whole.
@@ -70,16 +68,6 @@ pub fn summarise(region: Region, prefixes: &[Vec<Prefix>], plane: usize) -> Plan
         rms: errors.map(|(rms, _)| rms.sqrt()),
         relative: errors.map(|(_, relative)| relative.sqrt()),
     }
-}
-
-/// Upper end of a one-sided interval around `centre` from jackknife pseudo-values.
-fn upper(centre: f64, pseudo_values: &[f64], look: u32) -> f64 {
-    let n = pseudo_values.len() as f64;
-    let mean = pseudo_values.iter().sum::<f64>() / n;
-    let variance = pseudo_values.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / (n * (n - 1.0));
-    let k = f64::from(look.max(1));
-    let alpha = 6.0 * FALSE_STOP_PROBABILITY / (core::f64::consts::PI * core::f64::consts::PI * k * k);
-    centre.max(mean) + student_t_upper(alpha, pseudo_values.len() as u32 - 1) * variance.sqrt()
 }
 
 /// Means of a plane of each replicate over all regions, three channels a pixel; `None` where there is only
@@ -183,35 +171,11 @@ mod tests {
     #[test]
     fn the_rms_error_of_uniform_noise_is_known_and_does_not_change_with_exposure() {
         let size = Size { width: 64, height: 64 };
-        let e = estimate(size.frame(), &prefixes(size, 4, &mut 7), 1).unwrap();
+        let e = estimate(size.frame(), &prefixes(size, 4, &mut 7), Look::at(1)).unwrap();
         // σ² of the mean of 4: 1/48. 12288 estimates with 3 degrees of freedom: 0.74 % of σ² a standard deviation.
         let expected = (1.0_f64 / 48.0).sqrt();
         assert!((e.rms / expected - 1.0).abs() < 0.012, "{e:?}");
         assert!(e.relative_upper.unwrap() > e.relative);
-    }
-
-    #[test]
-    fn the_upper_end_covers_the_true_relative_error_as_often_as_it_says() {
-        let size = Size { width: 12, height: 12 };
-        let truth = {
-            let mut squares = 0.0;
-            let mut state = 99;
-            for _ in 0..400 {
-                squares +=
-                    estimate(size.frame(), &prefixes(size, 4, &mut state), 1).unwrap().relative.powi(2);
-            }
-            (squares / 400.0_f64).sqrt()
-        };
-        let mut state = 1;
-        let trials = 400;
-        let covered = (0..trials)
-            .filter(|_| {
-                let e = estimate(size.frame(), &prefixes(size, 4, &mut state), 1).unwrap();
-                e.relative_upper.unwrap() >= truth
-            })
-            .count();
-        // The first look claims 1 − 6·0.05/π² = 0.9696; binomial σ is 0.0086.
-        assert!(covered as f64 / f64::from(trials) > 0.9696 - 3.0 * 0.0086, "{covered} of {trials}");
     }
 
     #[test]
@@ -229,7 +193,7 @@ mod tests {
         });
         let prefixes = vec![one.collect()];
         let [whole, layer] = [0, 1].map(|plane| summarise(size.frame(), &prefixes, plane));
-        let all = estimate(size.frame(), &prefixes, 1).unwrap();
+        let all = estimate(size.frame(), &prefixes, Look::at(1)).unwrap();
         assert_eq!((whole.rms, whole.relative), (Some(all.rms), Some(all.relative)));
         // A power of two changes no bit.
         assert_eq!(layer.mean_luminance, 0.125 * whole.mean_luminance);
@@ -241,8 +205,11 @@ mod tests {
     #[test]
     fn one_replicate_has_no_error_and_two_have_no_interval() {
         let size = Size { width: 4, height: 4 };
-        assert_eq!(estimate(size.frame(), &prefixes(size, 1, &mut 3), 1), None);
-        assert_eq!(estimate(size.frame(), &prefixes(size, 2, &mut 3), 1).unwrap().relative_upper, None);
+        assert_eq!(estimate(size.frame(), &prefixes(size, 1, &mut 3), Look::at(1)), None);
+        assert_eq!(
+            estimate(size.frame(), &prefixes(size, 2, &mut 3), Look::at(1)).unwrap().relative_upper,
+            None
+        );
     }
 
     #[test]

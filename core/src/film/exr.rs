@@ -92,7 +92,7 @@ pub struct Layers {
     pub height: usize,
     /// Values by full channel name.
     pub channels: BTreeMap<String, Vec<f32>>,
-    /// Text attributes.
+    /// Attributes that are texts or numbers.
     pub attributes: BTreeMap<String, String>,
 }
 
@@ -339,6 +339,8 @@ fn decode(bytes: &[u8], values_max: u64) -> Result<Layers, ExrError> {
     let attributes = texts
         .filter_map(|(name, value)| match value {
             AttributeValue::Text(text) => Some((name.to_string(), text.to_string())),
+            AttributeValue::F32(number) => Some((name.to_string(), number.to_string())),
+            AttributeValue::I32(number) => Some((name.to_string(), number.to_string())),
             _ => None,
         })
         .collect();

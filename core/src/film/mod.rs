@@ -2,12 +2,15 @@
 
 pub mod append;
 pub mod batch;
+pub mod certificate;
 pub mod compare;
 pub mod develop;
 pub mod error;
 pub mod estimate;
 pub mod exr;
 pub mod invalid;
+pub mod reference;
 pub mod schedule;
+pub mod shares;
 pub mod size;
 pub mod sum;

@@ -1,7 +1,7 @@
 //! What is in a scene, what a render of it needs and what it leaves out.
 
 use crate::bsdf::Bsdf;
-use crate::bsdf::event::Letters;
+use crate::bsdf::event::{Letter, Letters};
 use crate::bsdf::surface::SurfaceParameters;
 use crate::gltf::bundle::Bundle;
 use crate::gltf::error::{LoadError, Problem};
@@ -13,8 +13,10 @@ use crate::path::expression::language::LightTag;
 use crate::path::reach::{EyeKind, LightKind, Surroundings};
 use crate::scene::camera::{Camera, Projection};
 use crate::scene::data::SceneData;
+use crate::scene::environment::Environment;
 use crate::scene::material::{Coverage, Material, RoughnessMap};
 use crate::scene::punctual::PunctualKind;
+use crate::settings::Method;
 use std::sync::Arc;
 
 /// What a scene without light needs.
@@ -33,6 +35,8 @@ pub struct Contents {
     pub parallel: Vec<bool>,
     /// Letters that its surfaces can have, by the factors of their materials.
     pub letters: Letters,
+    /// The largest radiance that a channel of an emissive surface or of the sky has, in W/(sr·m²).
+    pub brightest: f64,
     /// What a render needs.
     pub needs: Vec<String>,
     /// What a render leaves out.
@@ -63,11 +67,31 @@ pub fn inspect(bytes: impl Into<Arc<[u8]>>, limits: &Limits) -> Result<Contents,
             .map(|camera| matches!(camera.projection, Projection::Orthographic { .. }))
             .collect(),
         letters: data.materials.iter().map(letters).fold(Letters::NONE, Letters::union),
+        brightest: brightest(data),
         needs,
         leaves_out,
         report: loaded.report,
         warnings: loaded.warnings,
     })
+}
+
+fn brightest(data: &SceneData) -> f64 {
+    if !data.is_lit() {
+        return f64::from(Environment::default_sky().brightest());
+    }
+    data.materials.iter().map(|m| f64::from(m.emission.factor.max_element())).fold(0.0, f64::max)
+}
+
+/// The brightest that a sample can be which meets a light by chance only: as bright as the brightest light, where eye subpaths may
+/// come to it by a glossy or specular surface. Lights without extent are never met by chance.
+pub fn by_chance(method: Method, letters: Letters, brightest: f64) -> Option<f64> {
+    let met = match method {
+        Method::Path | Method::Bidirectional => {
+            letters != Letters::of(Letter::Diffuse) && letters != Letters::NONE
+        }
+        Method::Light | Method::Photon | Method::Radiosity => false,
+    };
+    (met && brightest > 0.0).then_some(brightest)
 }
 
 impl Contents {

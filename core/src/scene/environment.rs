@@ -60,6 +60,11 @@ impl Environment {
         Self::new(2, height, (0..height).flat_map(row).collect(), 0.0)
     }
 
+    /// The largest radiance that a channel of it has.
+    pub fn brightest(&self) -> f32 {
+        self.texels.as_flattened().iter().copied().fold(0.0, f32::max)
+    }
+
     /// From the bytes of an EXR or Radiance HDR image. Values that are not finite or are negative count as zero.
     pub fn decode(bytes: &[u8], turn_degrees: f64) -> Result<Self, EnvironmentError> {
         let unreadable = |e: image::ImageError| EnvironmentError::Unreadable(e.to_string());

@@ -116,7 +116,7 @@ impl Watching {
         for row in &rows[known..] {
             self.seen.checkpoints += 1;
             // Named after the status that came before it, so that the next one is not missed.
-            self.push("checkpoint", &JobEvent::Checkpoint(*row), self.seen);
+            self.push("checkpoint", &JobEvent::Checkpoint(row.clone()), self.seen);
         }
         self.tell(status);
         Ok(())

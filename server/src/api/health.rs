@@ -29,14 +29,14 @@ pub async fn ready(State(farm): State<Arc<Farm>>) -> Result<&'static str> {
 }
 
 /// How many workers the queue could use now.
-pub async fn scaling(State(farm): State<Arc<Farm>>) -> Json<Scaling> {
-    Json(farm.scaling())
+pub async fn scaling(State(farm): State<Arc<Farm>>) -> Result<Json<Scaling>> {
+    Ok(Json(farm.scaling().await?))
 }
 
 /// Numbers for Prometheus (text format 0.0.4).
 pub async fn metrics(State(farm): State<Arc<Farm>>) -> Result<Response> {
     let counts = farm.store.counts().await.map_err(FarmError::from)?;
-    let scaling = farm.scaling();
+    let scaling = farm.scaling().await?;
     let mut text = Metrics::default();
     text.kind("ovtigre_jobs", "gauge", "Jobs by state.");
     for state in [

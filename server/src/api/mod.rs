@@ -46,6 +46,7 @@ pub fn router(farm: Arc<Farm>, guarding: Guarding) -> Router {
         .route("/v1/jobs/{id}/pixel", get(pixel::get))
         .route("/v1/jobs/{id}/error.json", get(curve::json))
         .route("/v1/jobs/{id}/error.csv", get(curve::csv))
+        .route("/v1/jobs/{id}/error.svg", get(curve::svg))
         .route("/v1/workers", post(workers::join).get(workers::list))
         .route("/v1/workers/{id}", get(workers::get).delete(workers::drain))
         .route("/v1/workers/{id}/exchange", post(workers::exchange))

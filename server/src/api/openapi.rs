@@ -14,7 +14,7 @@ use ovtigre_proto::{
     lease::{Committed, Exchange, ExchangeReply, LeaseFailure, WorkerJoin, WorkerJoined},
     pixel::Pixel,
     problem::Problem,
-    scene::SceneReport,
+    scene::{PartsReceived, SceneReport},
     status::{JobEvent, JobStatus, Page, Scaling, WorkerStatus},
 };
 use schemars::{JsonSchema, Schema, SchemaGenerator, generate::SchemaSettings};
@@ -95,9 +95,19 @@ fn of_scenes_and_jobs(method: &Method, path: &str) -> Option<Operation> {
     };
     let operation = Operation { id, summary, ..PLAIN };
     Some(match id {
-        "uploadScene" | "putScene" => Operation {
+        "uploadScene" => Operation {
             takes: BYTES,
             gives: vec![(201, json::<SceneReport>()), (200, json::<SceneReport>())],
+            ..operation
+        },
+        "putScene" => Operation {
+            heads: &["Content-Range"],
+            takes: BYTES,
+            gives: vec![
+                (201, json::<SceneReport>()),
+                (200, json::<SceneReport>()),
+                (202, json::<PartsReceived>()),
+            ],
             ..operation
         },
         "getScene" => Operation { gives: vec![(200, json::<SceneReport>())], ..operation },

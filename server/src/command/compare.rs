@@ -3,16 +3,11 @@
 use super::{
     exit::{CommandError, Exit, Outcome},
     table, terminal,
+    truth::read,
 };
 use clap::Args;
-use ovtigre_core::film::{
-    compare::{Comparison, compare},
-    exr::{Layers, read_layers},
-};
-use std::{
-    path::{Path, PathBuf},
-    process::ExitCode,
-};
+use ovtigre_core::film::compare::{Comparison, compare};
+use std::{path::PathBuf, process::ExitCode};
 
 /// Compare two pictures.
 #[derive(Args, Debug)]
@@ -45,12 +40,6 @@ impl Compare {
             |tolerance: f64| comparison.layers.values().all(|layer| layer.relative_error <= tolerance);
         Ok(if self.tolerance.is_none_or(within) { ExitCode::SUCCESS } else { Exit::Different.into() })
     }
-}
-
-fn read(path: &Path) -> Outcome<Layers> {
-    let wrong = |reason: String| CommandError::wrong(format!("{}: {reason}", path.display()));
-    let bytes = std::fs::read(path).map_err(|e| wrong(e.to_string()))?;
-    read_layers(&bytes).map_err(|e| wrong(e.to_string()))
 }
 
 fn show(comparison: &Comparison) {

@@ -5,6 +5,7 @@ use super::{
     interrupt::Interrupt,
     local_workers::LocalWorkers,
     progress::Progress,
+    truth::Truth,
 };
 use ovtigre_proto::{
     client::{error::ClientError, farm::Client},
@@ -39,13 +40,14 @@ impl Workers<'_> {
 }
 
 /// Shows a job until it is over. A first interrupt cancels it and goes on waiting, for the picture so
-/// far; a second one ends the waiting.
+/// far; a second one ends the waiting. At each checkpoint the picture so far is compared with the reference, where there is one.
 pub(crate) async fn until_over(
     client: &Client,
     job: &JobId,
     progress: &mut Progress,
     interrupt: &Interrupt,
     workers: &Workers<'_>,
+    mut truth: Option<&mut Truth>,
 ) -> Outcome<JobStatus> {
     let mut events = client.events(job);
     let mut last = None;
@@ -57,7 +59,11 @@ pub(crate) async fn until_over(
                     progress.show(&status);
                     last = Some(*status);
                 }
-                Some(JobEvent::Checkpoint(_)) => {}
+                Some(JobEvent::Checkpoint(row)) => {
+                    if let Some(truth) = &mut truth {
+                        truth.look(client, job, &row).await?;
+                    }
+                }
                 None => return last.ok_or_else(|| CommandError::failed("the farm said nothing of the job")),
             },
             () = interrupt.once(), if !cancelled => {

@@ -105,6 +105,12 @@ pub(crate) struct JobFlags {
     /// Write error against run time and how the job ended to this file.
     #[arg(long, value_name = "FILE.json")]
     pub(crate) report: Option<PathBuf>,
+    /// Draw error against run time into this file.
+    #[arg(long, value_name = "FILE.svg")]
+    pub(crate) plot: Option<PathBuf>,
+    /// Picture that is much closer to the truth: the report and the plot show the errors against it, too.
+    #[arg(long, value_name = "FILE.exr")]
+    pub(crate) reference: Option<PathBuf>,
 }
 
 impl JobFlags {

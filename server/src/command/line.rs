@@ -1,7 +1,7 @@
 //! The command line.
 
 use super::{
-    bake, cancel, check, compare, exit::Outcome, fetch, pause, render, resume, serve, status, submit,
+    bake, bench, cancel, check, compare, exit::Outcome, fetch, pause, render, resume, serve, status, submit,
     terminal, token, watch, work, workers,
 };
 use clap::{Parser, Subcommand};
@@ -45,6 +45,8 @@ enum Command {
     Check(check::Check),
     /// Solve the diffuse light of a scene and write it as a glTF scene that other viewers show.
     Bake(bake::Bake),
+    /// Measure error against run time of methods over scenes.
+    Bench(bench::Bench),
     /// Compare two pictures.
     Compare(compare::Compare),
 }
@@ -89,6 +91,7 @@ impl Command {
             Self::Token(command) => command.run().await?,
             Self::Check(command) => command.run()?,
             Self::Bake(command) => command.run().await?,
+            Self::Bench(command) => command.run().await?,
             Self::Compare(command) => return command.run(),
         }
         Ok(ExitCode::SUCCESS)

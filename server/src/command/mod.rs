@@ -5,6 +5,8 @@ pub(crate) mod line;
 pub(crate) mod terminal;
 
 mod bake;
+mod bench;
+mod bench_table;
 mod cancel;
 mod check;
 mod compare;
@@ -29,6 +31,8 @@ mod submission;
 mod submit;
 mod table;
 mod token;
+mod trial;
+mod truth;
 mod watch;
 mod words;
 mod work;

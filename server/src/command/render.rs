@@ -49,11 +49,11 @@ impl Render {
     pub(crate) async fn run(self) -> Outcome {
         terminal::log(if self.verbose { "info" } else { "error" });
         let interrupt = Interrupt::listen();
-        let submission = Submission::read(&self.scene, self.job).await?;
+        let mut submission = Submission::read(&self.scene, self.job).await?;
         let others = if self.verbose { Others::Log } else { Others::None };
         if let Some(server) = &self.server {
             let client = farm_flags::client(server, self.token.as_deref())?;
-            return carry_out(&client, &submission, others, &interrupt, Workers::Theirs).await;
+            return carry_out(&client, &mut submission, others, &interrupt, Workers::Theirs).await;
         }
         let plan = Plan {
             workers: self.workers,
@@ -64,7 +64,7 @@ impl Render {
         let farm = Embedded::start(plan).await?;
         let client = farm_flags::client(&farm.address(), None)?;
         let workers = Workers::Ours(&farm.workers);
-        let outcome = carry_out(&client, &submission, others, &interrupt, workers).await;
+        let outcome = carry_out(&client, &mut submission, others, &interrupt, workers).await;
         tokio::select! {
             () = farm.stop() => {}
             () = interrupt.twice() => {}
@@ -75,7 +75,7 @@ impl Render {
 
 async fn carry_out(
     client: &Client,
-    submission: &Submission,
+    submission: &mut Submission,
     others: Others,
     interrupt: &Interrupt,
     workers: Workers<'_>,
@@ -84,13 +84,14 @@ async fn carry_out(
         job = submission.submit(client) => job?,
         () = interrupt.once() => return Err(CommandError::stopped("stopped before the job was submitted")),
     };
+    let mut truth = submission.truth.take();
     let mut progress = Progress::new(others);
     progress.show(&job);
-    let status = until_over(client, &job.id, &mut progress, interrupt, &workers).await?;
+    let status = until_over(client, &job.id, &mut progress, interrupt, &workers, truth.as_mut()).await?;
     drop(progress);
     workers.dismiss();
     tokio::select! {
-        collected = submission.collect(client, &status) => collected,
+        collected = submission.collect(client, &status, truth.as_ref()) => collected,
         () = interrupt.twice() => Err(CommandError::stopped("left before the picture was written")),
     }
 }

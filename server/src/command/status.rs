@@ -44,7 +44,7 @@ impl Status {
 }
 
 fn row(job: &JobStatus) -> [String; 7] {
-    let error = job.error.and_then(|row| row.relative_error);
+    let error = job.error.as_ref().and_then(|row| row.relative_error);
     [
         job.id.to_string(),
         job.name.clone(),

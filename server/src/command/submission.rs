@@ -4,7 +4,9 @@ use super::{
     exit::{CommandError, Outcome},
     job_flags::JobFlags,
     output::{Output, check_writable},
-    report, scene_file, terminal, words,
+    report, scene_file, terminal,
+    truth::Truth,
+    words,
 };
 use ovtigre_proto::{
     client::{error::ClientError, farm::Client, file::Upload},
@@ -27,6 +29,8 @@ pub(crate) struct Submission {
     flags: JobFlags,
     name: String,
     pub(crate) output: Output,
+    /// What the pictures so far are compared with.
+    pub(crate) truth: Option<Truth>,
 }
 
 #[derive(Debug)]
@@ -39,16 +43,17 @@ impl Submission {
     /// Reads the scene and all that the flags name.
     pub(crate) async fn read(scene: &Path, flags: JobFlags) -> Outcome<Self> {
         let output = Output::new(flags.output.as_deref(), scene)?;
-        if let Some(report) = &flags.report {
-            check_writable(report)?;
+        for file in flags.report.iter().chain(&flags.plot) {
+            check_writable(file)?;
         }
+        let truth = flags.reference.as_deref().map(Truth::read).transpose()?;
         let environment = match &flags.environment {
             None => None,
             Some(text) => Some(environment(text).await?),
         };
         let name = scene.file_stem().unwrap_or(scene.as_os_str()).to_string_lossy().into_owned();
         let path = scene.to_owned();
-        Ok(Self { path, scene: scene_file::read(scene).await?, environment, flags, name, output })
+        Ok(Self { path, scene: scene_file::read(scene).await?, environment, flags, name, output, truth })
     }
 
     /// Uploads what the farm does not have, and submits.
@@ -73,7 +78,12 @@ impl Submission {
     }
 
     /// Fetches the picture and the report of a job that is over, and says how it ended.
-    pub(crate) async fn collect(&self, client: &Client, status: &JobStatus) -> Outcome {
+    pub(crate) async fn collect(
+        &self,
+        client: &Client,
+        status: &JobStatus,
+        truth: Option<&Truth>,
+    ) -> Outcome {
         if status.state == JobState::Failed {
             let reason = status.reason.as_deref().unwrap_or("the farm does not say why");
             return Err(CommandError::failed(format!("the job failed: {reason}")));
@@ -85,9 +95,8 @@ impl Submission {
             _ => error.into(),
         })?;
         self.output.write(exr, client, &status.id).await?;
-        if let Some(path) = &self.flags.report {
-            report::write(client, status, path).await?;
-        }
+        let files = report::Files { report: self.flags.report.as_deref(), plot: self.flags.plot.as_deref() };
+        report::write(client, status, truth, &self.output.exr, &files).await?;
         terminal::result(&words::list(&[
             self.output.png.as_ref().unwrap_or(&self.output.exr).display().to_string(),
             words::samples(status),
@@ -98,7 +107,12 @@ impl Submission {
             status.error_target.filter(|_| !status.certified && status.state == JobState::Done)
         {
             terminal::remark(&format!(
-                "warning: the error is not certified to be under {target}: it needs more samples"
+                "warning: the error is not certified to be under {target}: {}",
+                status
+                    .error
+                    .as_ref()
+                    .and_then(|row| row.doubt.as_ref())
+                    .map_or_else(|| "it needs more samples".to_owned(), ToString::to_string)
             ));
         }
         match status.state {
@@ -109,7 +123,7 @@ impl Submission {
 
     /// Whether there is something to do when the job is over.
     pub(crate) fn wants_files(&self) -> bool {
-        self.flags.output.is_some() || self.flags.report.is_some()
+        self.flags.output.is_some() || self.flags.report.is_some() || self.flags.plot.is_some()
     }
 }
 

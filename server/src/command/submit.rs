@@ -29,7 +29,7 @@ impl Submit {
     /// Submits.
     pub(crate) async fn run(self) -> Outcome {
         let client = self.farm.client()?;
-        let submission = Submission::read(&self.scene, self.job).await?;
+        let mut submission = Submission::read(&self.scene, self.job).await?;
         let job = submission.submit(&client).await?;
         if self.farm.json {
             terminal::json(&job);
@@ -43,10 +43,13 @@ impl Submit {
             return Ok(());
         }
         let interrupt = Interrupt::listen();
+        let mut truth = submission.truth.take();
         let mut progress = Progress::new(Others::None);
         progress.show(&job);
-        let status = until_over(&client, &job.id, &mut progress, &interrupt, &Workers::Theirs).await?;
+        let workers = Workers::Theirs;
+        let status =
+            until_over(&client, &job.id, &mut progress, &interrupt, &workers, truth.as_mut()).await?;
         drop(progress);
-        submission.collect(&client, &status).await
+        submission.collect(&client, &status, truth.as_ref()).await
     }
 }

@@ -29,9 +29,10 @@ pub(crate) fn bytes(count: u64) -> String {
 
 /// The relative error and its upper bound; empty where there is none.
 pub(crate) fn error(row: Option<&CurveRow>) -> String {
-    match row.map(|row| (row.relative_error, row.relative_error_upper)) {
-        Some((Some(error), Some(upper))) => format!("error ±{error:.4} (at most {upper:.4})"),
-        Some((Some(error), None)) => format!("error ±{error:.4}"),
+    match row.map(|row| (row.relative_error, row.relative_error_upper, &row.doubt)) {
+        Some((Some(error), _, Some(_))) => format!("error ±{error:.4} (not certified)"),
+        Some((Some(error), Some(upper), None)) => format!("error ±{error:.4} (at most {upper:.4})"),
+        Some((Some(error), None, None)) => format!("error ±{error:.4}"),
         _ => String::new(),
     }
 }

@@ -3,12 +3,16 @@
 use super::{
     Farm,
     append::{Held, Merge, blocking},
+    curve::target_at,
     error::Result,
     live::{Ending, Live, Waits},
 };
-use crate::store::row::NewCheckpoint;
+use crate::{fail_point::FailPoint, store::row::NewCheckpoint};
 use ovtigre_core::{
-    film::error::{ErrorEstimate, PlaneSummary, estimate, summarise},
+    film::{
+        certificate::Look,
+        error::{ErrorEstimate, PlaneSummary, estimate, summarise},
+    },
     settings::Shows,
 };
 use ovtigre_proto::{
@@ -24,7 +28,8 @@ impl Farm {
         let row = self.take_row(live, &mut held, found).await?;
         let merge = held.as_ref().expect("loaded by the caller");
         let reached = live.spec.error_target.is_some_and(|target| {
-            row.relative_error_upper.is_some_and(|upper| upper <= target) && has_light(merge)
+            let under = row.relative_error_upper.is_some_and(|upper| upper <= target);
+            under && row.doubt.is_none() && has_light(merge)
         });
         let done = |reason: &str| Ending {
             state: JobState::Done,
@@ -35,7 +40,10 @@ impl Farm {
         let ending = if reached {
             Some(done("the error target was reached"))
         } else if merge.is_complete() {
-            Some(done("all samples asked for were drawn"))
+            let doubt = row.doubt.filter(|_| live.spec.error_target.is_some());
+            let doubt =
+                doubt.map_or_else(String::new, |doubt| format!("; the error is not certified: {doubt}"));
+            Some(done(&format!("all samples asked for were drawn{doubt}")))
         } else {
             self.book().reach(&live.id, merge.checkpoints);
             None
@@ -60,27 +68,49 @@ impl Farm {
         let merge = held.as_mut().expect("loaded by the caller");
         let progress = merge.progress();
         let wall_seconds = self.job_row(&live.id).await?.run_seconds;
-        let row = CurveRow {
+        let mut row = CurveRow {
             samples: progress.samples.round() as u32,
             wall_seconds,
             worker_seconds: progress.worker_micros as f64 * 1e-6,
             rays: progress.rays,
-            rms_error: found.map(|e| e.rms),
-            relative_error: found.map(|e| e.relative),
-            relative_error_upper: found.and_then(|e| e.relative_upper),
+            rms_error: found.as_ref().map(|e| e.rms),
+            relative_error: found.as_ref().map(|e| e.relative),
+            relative_error_upper: found.as_ref().and_then(|e| e.relative_upper),
+            target_expected_at_seconds: None,
+            doubt: found.and_then(|e| e.doubt),
         };
+        let mut rows = live.view().curve;
+        rows.push(row.clone());
+        row.target_expected_at_seconds = target_at(&rows, &live.spec);
         let mandate = Self::mandate(live)?;
+        FailPoint::CheckpointBeforeRow.pass();
         merge.checkpoints += 1;
-        let checkpoint = NewCheckpoint { look: merge.checkpoints, row, layers: layers.clone(), progress };
+        let checkpoint =
+            NewCheckpoint { look: merge.checkpoints, row: row.clone(), layers: layers.clone(), progress };
         if let Err(error) = self.store.add_checkpoint(&live.id, mandate, checkpoint).await {
             merge.checkpoints -= 1;
             return Err(error.into());
         }
+        FailPoint::CheckpointAfterRow.pass();
         live.set_view(|view| {
-            view.curve.push(row);
+            if view.curve.len() < merge.checkpoints as usize {
+                view.curve.push(row.clone());
+            }
             view.layers = layers;
         });
         Ok(row)
+    }
+}
+
+impl Merge {
+    /// The latest checkpoint is looked at once more where no lane is past it: whoever looked before may have
+    /// died when the job was about to end there.
+    pub(super) fn look_again(&mut self) {
+        let Some(latest) = self.checkpoints.checked_sub(1) else { return };
+        let Some(limit) = self.points.get(latest as usize) else { return };
+        if self.prefixes.iter().flatten().all(|prefix| prefix.blocks() <= *limit) {
+            self.checkpoints = latest;
+        }
     }
 }
 
@@ -92,13 +122,14 @@ struct Measured {
 
 /// The errors of what is appended. An estimate that is not finite is none.
 async fn measure(live: &Live, held: Held) -> Result<(Held, Measured)> {
-    let region = live.spec.region;
+    let (region, by_chance) = (live.spec.region, live.spec.by_chance);
     let planes = live.spec.settings.planes() as usize;
     let narrow = live.spec.settings.layers.iter().position(|layer| layer.shows == Shows::Narrow);
     let narrow = narrow.map(|layer| layer + 1);
     blocking(move || {
         let merge = held.as_ref().expect("loaded by the caller");
-        let found = estimate(region, &merge.prefixes, merge.checkpoints + 1);
+        let look = Look { number: merge.checkpoints + 1, by_chance };
+        let found = estimate(region, &merge.prefixes, look);
         let found = found.filter(|e| e.rms.is_finite() && e.relative.is_finite());
         let found = found.map(|e| ErrorEstimate {
             relative_upper: e.relative_upper.filter(|upper| upper.is_finite()),

@@ -18,6 +18,7 @@ pub mod live;
 pub mod mandates;
 pub mod open;
 pub mod others;
+pub mod parts;
 pub mod paths;
 pub mod picture;
 pub mod pixel;

@@ -93,6 +93,7 @@ impl Farm {
         } else {
             self.blobs.delete_all(&BlobFolder::Incoming).await?;
         }
+        self.blobs.delete_older(&BlobFolder::AllParts, UPLOAD_MAX).await?;
         for id in self.blobs.jobs().await? {
             match self.store.job(&id).await? {
                 None => self.blobs.delete_all(&BlobFolder::Job(id)).await?,
@@ -136,7 +137,7 @@ impl Farm {
         let entry = book::Entry::new(row.scene.clone(), settings, plan, order, hand_out, wants);
         let mut book = self.book();
         book.add(row.id.clone(), entry);
-        ledger.leases.into_iter().for_each(|lease| book.hold(lease, None));
+        ledger.leases.into_iter().for_each(|lease| book.hold(lease, None, 0));
         Ok(())
     }
 }

@@ -33,12 +33,10 @@ pub fn missing(
         CameraChoice::Framed => false,
         CameraChoice::Index(n) => scene.camera_rays_parallel.get(n as usize) == Some(&true),
     };
-    let letter = |name: &String| Letter::ALL.into_iter().find(|letter| letter.symbol() == name);
-    let letters = scene.letters.iter().filter_map(letter).map(Letters::of);
     // Which light has which name is not known here: each may have any.
     let there = kinds.into_iter().filter(|(_, there)| *there);
     let around = Surroundings {
-        letters: letters.fold(Letters::NONE, Letters::union),
+        letters: letters(scene),
         lights: there.flat_map(|(kind, _)| language.tags().map(move |tag| (kind, tag))).collect(),
         eye: match lens {
             Some(_) => EyeKind::Lens,
@@ -47,6 +45,12 @@ pub fn missing(
         },
     };
     unreachable(language, method, &around, request.bounces)
+}
+
+/// Letters that a scene's surfaces can have.
+pub fn letters(scene: &SceneContents) -> Letters {
+    let letter = |name: &String| Letter::ALL.into_iter().find(|letter| letter.symbol() == name);
+    scene.letters.iter().filter_map(letter).map(Letters::of).fold(Letters::NONE, Letters::union)
 }
 
 /// One line of it for people.

@@ -35,6 +35,9 @@ pub struct JobSpec {
     /// The id of the token that sent it.
     #[serde(default)]
     pub owner: Option<String>,
+    /// The brightest that a sample can be which meets a light by chance only.
+    #[serde(default)]
+    pub by_chance: Option<f64>,
     /// Why the method was chosen.
     pub method_reason: String,
     /// Paths that are asked for and that no technique of the method makes.

@@ -76,7 +76,7 @@ impl Farm {
             rays: progress.rays,
             invalid_samples: progress.invalid,
             workers,
-            error: curve.last().copied(),
+            error: curve.last().cloned(),
             error_target: spec.error_target,
             certified: row.certified,
             eta_seconds,
@@ -141,12 +141,19 @@ impl Farm {
     }
 
     /// How many workers the queue could use now.
-    pub fn scaling(&self) -> Scaling {
-        let book = self.book();
-        let (batches_waiting, leased) = (book.waiting(), book.leased());
-        drop(book);
-        let desired_workers = u32::try_from(batches_waiting + leased).unwrap_or(u32::MAX);
-        Scaling { desired_workers, active_workers: self.crew().active(self.rules.silence), batches_waiting }
+    pub async fn scaling(&self) -> Result<Scaling> {
+        // What other servers handed out is not in this one's book.
+        if self.is_shared() {
+            for live in self.lives() {
+                self.refresh_plan(&live.id).await?;
+            }
+        }
+        let batches_waiting = self.book().waiting();
+        let counts = self.store.counts().await?;
+        let desired_workers = u32::try_from(batches_waiting + counts.leases).unwrap_or(u32::MAX);
+        let active = counts.workers.iter().find(|(state, _)| *state == WorkerState::Active);
+        let active_workers = active.map_or(0, |(_, workers)| u32::try_from(*workers).unwrap_or(u32::MAX));
+        Ok(Scaling { desired_workers, active_workers, batches_waiting })
     }
 }
 
@@ -179,6 +186,6 @@ fn eta(row: &JobRow, progress: &Progress, spec: &JobSpec, curve: &[CurveRow]) ->
     let by_samples = (progress.samples > 0.0)
         .then(|| row.run_seconds * (asked - progress.samples).max(0.0) / progress.samples);
     let by_time = spec.seconds.map(|seconds| seconds - row.run_seconds);
-    let by_error = target_at(curve, spec, row).map(|at| at - row.run_seconds);
+    let by_error = target_at(curve, spec).map(|at| at - row.run_seconds);
     [by_samples, by_time, by_error].into_iter().flatten().map(|t| t.max(0.0)).min_by(f64::total_cmp)
 }

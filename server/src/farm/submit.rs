@@ -4,13 +4,17 @@ use super::{
     Farm,
     error::{FarmError, Result, fault},
     paths::choose,
-    reach::{DEFAULT_SKY, line, missing},
+    reach::{DEFAULT_SKY, letters, line, missing},
     rules::{PARTIAL_BYTES_MAX, Rules},
     spec::JobSpec,
 };
-use crate::store::row::{Added, IdempotencyKey, NewJob};
+use crate::{
+    fail_point::FailPoint,
+    store::row::{Added, IdempotencyKey, NewJob},
+};
 use ovtigre_core::{
     film::size::{Region, Size},
+    render::inspect::by_chance,
     settings::{CameraChoice, Environment, EnvironmentSource, Lens, Settings, Shutter},
 };
 use ovtigre_proto::{
@@ -43,7 +47,7 @@ impl Farm {
     pub async fn check(&self, request: JobRequest) -> Result<JobSpec> {
         let scene = request.scene.clone();
         let scene = scene.ok_or_else(|| FarmError::Request(vec![fault("/scene", "'scene' is required")]))?;
-        let contents = match self.upload_at("/scene", &scene).await?.content {
+        let mut contents = match self.upload_at("/scene", &scene).await?.content {
             SceneContent::Scene(contents) => contents,
             SceneContent::Environment { .. } => {
                 let detail =
@@ -51,11 +55,21 @@ impl Farm {
                 return Err(FarmError::Request(vec![fault("/scene", detail)]));
             }
         };
-        if let Some(EnvironmentRequest::Image(id)) = &request.environment
-            && let SceneContent::Scene(_) = self.upload_at("/environment", id).await?.content
-        {
-            let detail = format!("'{id}' is a scene: give an uploaded image here");
-            return Err(FarmError::Request(vec![fault("/environment", detail)]));
+        match &request.environment {
+            None => {}
+            Some(EnvironmentRequest::Uniform(radiance)) => {
+                contents.brightest =
+                    radiance.iter().copied().map(f64::from).fold(contents.brightest, f64::max);
+            }
+            Some(EnvironmentRequest::Image(id)) => match self.upload_at("/environment", id).await?.content {
+                SceneContent::Environment { brightest, .. } => {
+                    contents.brightest = contents.brightest.max(brightest);
+                }
+                SceneContent::Scene(_) => {
+                    let detail = format!("'{id}' is a scene: give an uploaded image here");
+                    return Err(FarmError::Request(vec![fault("/environment", detail)]));
+                }
+            },
         }
         resolve(request, &contents, &self.rules).map_err(FarmError::Request)
     }
@@ -95,6 +109,12 @@ impl Farm {
             key: format!("{}/{key}", owner.as_deref().unwrap_or_default()),
             fingerprint: blake3::hash(&asked).to_hex().to_string(),
         });
+        // A job that was taken before is told of, also where no further one would be taken.
+        if let Some(key) = &key
+            && let Some(before) = self.store.keyed(key).await?
+        {
+            return self.taken_before(before).await;
+        }
         self.need_room()?;
         let mut spec = self.check(request).await?;
         self.has_room_for(owner.as_deref())?;
@@ -110,15 +130,23 @@ impl Farm {
             regions: spec.schedule().regions().len() as u32,
             replicates: spec.settings.replicates,
         };
+        FailPoint::JobBeforeRow.pass();
         match self.store.add_job(new, key).await? {
             Added::New => {
+                FailPoint::JobAfterRow.pass();
                 let row = self.job_row(&id).await?;
                 tracing::info!(job = %id, name = row.name, "job taken");
                 self.take_up(&row).await?;
                 self.status_of(&row).await
             }
+            before => self.taken_before(before).await,
+        }
+    }
+
+    async fn taken_before(&self, before: Added) -> Result<JobStatus> {
+        match before {
+            Added::New | Added::KeyTaken => Err(FarmError::KeyTaken),
             Added::Before(id) => self.status(&id).await,
-            Added::KeyTaken => Err(FarmError::KeyTaken),
         }
     }
 }
@@ -202,6 +230,7 @@ pub fn resolve(
         seconds: request.seconds,
         build: rules.build.to_owned(),
         owner: None,
+        by_chance: by_chance(chosen.method, letters(scene), scene.brightest),
         method_reason: chosen.reason.to_owned(),
         unreachable,
         warnings,

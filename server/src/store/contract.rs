@@ -8,6 +8,7 @@ use super::{
         Mandate, NewCheckpoint, NewCommit, NewJob, Progress, Settlement,
     },
 };
+use ovtigre_core::film::certificate::{Cause, Culprit, Doubt};
 use ovtigre_proto::{
     curve::{CurveRow, LayerError},
     id::{BlobId, JobId, LeaseId, WorkerId},
@@ -91,7 +92,7 @@ pub(crate) async fn run<F: Future<Output = Arc<dyn Store>>>(open: impl Fn() -> F
 }
 
 async fn scenes_are_remembered_once(store: &dyn Store) {
-    let content = SceneContent::Environment { width: 4, height: 2 };
+    let content = SceneContent::Environment { width: 4, height: 2, brightest: 2.5 };
     let report = SceneReport { id: hash(1), bytes: 77, content };
     store.add_scene(report.clone()).await.unwrap();
     store.add_scene(SceneReport { bytes: 78, ..report.clone() }).await.unwrap();
@@ -274,9 +275,14 @@ async fn curves_and_snapshots_are_kept(store: &dyn Store) {
         rms_error: Some(0.5),
         relative_error: Some(0.25),
         relative_error_upper: None,
+        target_expected_at_seconds: Some(9.5),
+        doubt: None,
     };
     let progress = Progress { batches: 4, ..Progress::default() };
-    let second = CurveRow { samples: 8, ..row };
+    let culprit = Culprit { x: 3, y: 5, share: 0.75 };
+    let doubt =
+        Doubt { cause: Cause::FewPixels, effective_pixels: 1.5, lone_share: 0.25, pixels: vec![culprit] };
+    let second = CurveRow { samples: 8, doubt: Some(doubt), ..row.clone() };
     let layer = LayerError {
         mean_luminance: 0.5,
         rms_error: Some(0.1),
@@ -287,9 +293,9 @@ async fn curves_and_snapshots_are_kept(store: &dyn Store) {
         |look, row, layers: &[LayerError]| NewCheckpoint { look, row, layers: layers.to_vec(), progress };
     assert_eq!(store.layers(&job).await.unwrap(), []);
     let mandate = store.take_merge(&job, "s", LONG).await.unwrap().unwrap();
-    store.add_checkpoint(&job, mandate, checkpoint(1, row, &[])).await.unwrap();
-    store.add_checkpoint(&job, mandate, checkpoint(2, second, &[layer, layer])).await.unwrap();
-    store.add_checkpoint(&job, mandate, checkpoint(1, second, &[layer])).await.unwrap();
+    store.add_checkpoint(&job, mandate, checkpoint(1, row.clone(), &[])).await.unwrap();
+    store.add_checkpoint(&job, mandate, checkpoint(2, second.clone(), &[layer, layer])).await.unwrap();
+    store.add_checkpoint(&job, mandate, checkpoint(1, second.clone(), &[layer])).await.unwrap();
     assert_eq!(store.layers(&job).await.unwrap(), [layer, layer]);
     assert_eq!(store.curve(&job).await.unwrap(), [row, second]);
     assert_eq!(store.job(&job).await.unwrap().unwrap().progress, progress);

@@ -37,7 +37,7 @@ pub fn to_lens<E: Throughput<EyeState>, L: Throughput<LightState>>(
     if light.is_dead() || light.total() == Vec3::ZERO {
         return;
     }
-    let passes = unblocked::between(scene, vertex, &walk.media, seen.end, tally);
+    let passes = unblocked::seen(scene, vertex, &walk.media, seen.end, tally);
     if passes == Vec3::ZERO {
         return;
     }

@@ -58,7 +58,7 @@ fn inspect() -> Inspect {
             return Err(crate::farm::error::fault("/meshes/0", "the mesh is bad"));
         }
         if bytes.starts_with(b"sky") {
-            return Ok(SceneContent::Environment { width: 2, height: 1 });
+            return Ok(SceneContent::Environment { width: 2, height: 1, brightest: 1.0 });
         }
         let cameras = vec!["front".to_owned(), "side".to_owned()];
         let camera_aspect_ratios = vec![Some(2.0), None];

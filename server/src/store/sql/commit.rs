@@ -127,12 +127,15 @@ pub(super) async fn add_checkpoint(
     let NewCheckpoint { look, row, layers, progress } = new;
     let insert = query(
         "INSERT INTO checkpoint (job, look, samples, wall_seconds, worker_seconds, rays,
-                                 rms_error, relative_error, relative_error_upper, layers)
-         VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10) ON CONFLICT DO NOTHING",
+                                 rms_error, relative_error, relative_error_upper, layers,
+                                 target_expected_at_seconds, doubt)
+         VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12) ON CONFLICT DO NOTHING",
     );
     let insert = insert.bind(job.as_str()).bind(look).bind(row.samples).bind(row.wall_seconds);
     let insert = insert.bind(row.worker_seconds).bind(row.rays).bind(row.rms_error);
     let insert = insert.bind(row.relative_error).bind(row.relative_error_upper).bind(to_json(&layers)?);
+    let insert =
+        insert.bind(row.target_expected_at_seconds).bind(row.doubt.as_ref().map(to_json).transpose()?);
     if db.execute(insert).await? > 0 {
         let progress = to_json(&progress)?;
         let set = query("UPDATE job SET progress = $2, looks = $3 WHERE id = $1");
@@ -160,6 +163,8 @@ pub(super) async fn curve(db: &mut Db, job: &JobId) -> Result<Vec<CurveRow>> {
             rms_error: row.real_or_none("rms_error")?,
             relative_error: row.real_or_none("relative_error")?,
             relative_error_upper: row.real_or_none("relative_error_upper")?,
+            target_expected_at_seconds: row.real_or_none("target_expected_at_seconds")?,
+            doubt: row.text_or_none("doubt")?.map(|_| from_json(row, "doubt")).transpose()?,
         })
     };
     db.all(rows).await?.iter().map(read).collect()

@@ -35,15 +35,22 @@ pub(super) async fn scene(db: &mut Db, id: &BlobId) -> Result<Option<SceneRow>> 
     Ok(Some(SceneRow { report: from_json(&row, "report")?, created_at: time(row.whole("created_ms")?)? }))
 }
 
+/// What became of an earlier job under that key.
+pub(super) async fn keyed(db: &mut Db, key: &IdempotencyKey) -> Result<Option<Added>> {
+    let before = query("SELECT fingerprint, job FROM idempotency WHERE key = $1").bind(&*key.key);
+    let Some(row) = db.first(before).await? else { return Ok(None) };
+    let same = row.text("fingerprint")? == key.fingerprint;
+    Ok(Some(if same { Added::Before(parse(&row, "job")?) } else { Added::KeyTaken }))
+}
+
 /// Adds a job with a cursor at block 0 of each lane, unless `key` was used before.
 pub(super) async fn add(db: &mut Db, job: NewJob, key: Option<IdempotencyKey>) -> Result<Added> {
     let now = db.now().await?;
-    if let Some(IdempotencyKey { key, fingerprint }) = key {
-        let before = query("SELECT fingerprint, job FROM idempotency WHERE key = $1").bind(&*key);
-        if let Some(row) = db.first(before).await? {
-            let same = row.text("fingerprint")? == fingerprint;
-            return if same { Ok(Added::Before(parse(&row, "job")?)) } else { Ok(Added::KeyTaken) };
+    if let Some(key) = key {
+        if let Some(before) = keyed(db, &key).await? {
+            return Ok(before);
         }
+        let IdempotencyKey { key, fingerprint } = key;
         let insert =
             query("INSERT INTO idempotency (key, fingerprint, job, created_ms) VALUES ($1, $2, $3, $4)");
         db.execute(insert.bind(key).bind(fingerprint).bind(job.id.as_str()).bind(now)).await?;
