@@ -74,6 +74,10 @@ fn a_scene_becomes_a_picture_with_the_page_alone() {
     pictures_are_compared(&browser);
     jobs_are_listed_and_cancelled(&browser, &farm, &job);
     workers_are_listed_and_drained(&browser);
+    browser.press("Interface");
+    browser.until("document.querySelectorAll('.call').length > 20");
+    assert!(text_of(&browser, "#schema-JobRequest").contains("relative error is certified"));
+    seen(&browser, "interface");
 }
 
 /// From a file to a job; its id.
