@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 /// A pixel of a job's picture so far.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Pixel {
-    /// The set of batches in it: as the picture's ETag.
+    /// The set of batches in it: as the picture's `ETag`.
     pub manifest: String,
     /// Its column in the frame.
     pub x: u32,

@@ -1,4 +1,4 @@
-//! The interface as an OpenAPI 3.1 document, made from the types that it speaks and the list of its doors.
+//! The interface as an `OpenAPI` 3.1 document, made from the types that it speaks and the list of its doors.
 
 use super::{
     image::PngParams,
@@ -49,7 +49,7 @@ struct Operation {
 }
 
 const fn json<T: JsonSchema>() -> Content {
-    Content::Json(|generator| generator.subschema_for::<T>())
+    Content::Json(SchemaGenerator::subschema_for::<T>)
 }
 
 const BYTES: Content = Content::Media("application/octet-stream");

@@ -21,6 +21,7 @@ use ovtigre_proto::{
     id::JobId,
     job::JobRequest,
     lease::{Committed, ExchangeReply, WorkerJoined},
+    pixel::Pixel,
     problem::Problem,
     status::JobState,
 };
@@ -658,18 +659,15 @@ async fn a_pixel_is_that_of_the_picture_while_it_is_made_and_after() {
         let exr = doors.get(&format!("{path}/image.exr")).await;
         let layers = read_layers(&exr.body).unwrap();
         for (x, y) in [(0, 0), (17, 9), (39, 29)] {
-            let pixel = doors.get(&format!("{path}/pixel?x={x}&y={y}")).await.json();
-            assert_eq!(exr.head("etag"), format!("\"{}\"", pixel["manifest"].as_str().unwrap()));
-            let plane = &pixel["planes"][0];
-            assert_eq!(plane["name"], "picture");
+            let told = doors.get(&format!("{path}/pixel?x={x}&y={y}")).await;
+            let pixel: Pixel = serde_json::from_slice(&told.body).unwrap();
+            assert_eq!(exr.head("etag"), format!("\"{}\"", pixel.manifest));
+            let [plane] = pixel.planes.as_slice() else { panic!("{} planes", pixel.planes.len()) };
+            assert_eq!(plane.name, "picture");
             for (c, channel) in ["R", "G", "B"].into_iter().enumerate() {
-                let of = |name: &str| f64::from(layers.channels[name][y * 40 + x]);
-                assert_eq!(plane["value"][c].as_f64().unwrap(), of(channel), "{step} at {x},{y}");
-                assert_eq!(
-                    plane["error"][c].as_f64().unwrap(),
-                    of(&format!("error.{channel}")),
-                    "{step} at {x},{y}"
-                );
+                let of = |name: &str| layers.channels[name][y * 40 + x];
+                assert_eq!(plane.value[c], of(channel), "{step} at {x},{y}");
+                assert_eq!(plane.error.unwrap()[c], of(&format!("error.{channel}")), "{step} at {x},{y}");
             }
         }
     }

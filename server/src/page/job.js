@@ -132,7 +132,7 @@ class JobView {
     const { job } = this;
     const error = errorOf(job);
     const one = (title, value, under, kind) => el('div', { class: kind ?? null }, el('dt', {}, title), el('dd', {}, value, under ? el('span', { class: 'under' }, under) : null));
-    const target = job.error_target ? `${job.certified ? 'certified' : 'target'} ≤ ${percent(job.error_target)}` : null;
+    const target = job.error_target ? `${job.certified ? 'certified' : 'target'} ≤\u00a0${percent(job.error_target)}` : null;
     const upper = job.error?.doubt ? 'not certified' : error?.upper ? `at most ${error.upper}` : null;
     const rays = job.worker_seconds > 0 ? `${short(job.rays / job.worker_seconds)} rays/s a worker` : null;
     fill(this.numbers,
