@@ -42,6 +42,9 @@ pub struct Exchange {
     pub scenes: Vec<BlobId>,
     /// Whether it is about to leave.
     pub leaving: bool,
+    /// Which of its exchanges this is, counted from 1. What was handed out in the answer to an earlier one and is not
+    /// held now was never heard of, and goes to another at once; not so where it is 0.
+    pub beat: u64,
 }
 
 /// How far a lease is.

@@ -6,6 +6,7 @@ pub mod id;
 pub mod job;
 pub mod lease;
 pub mod pair;
+pub mod pixel;
 pub mod problem;
 pub mod route;
 pub mod scene;

@@ -3,6 +3,15 @@
 use crate::id::BlobId;
 use serde::{Deserialize, Serialize};
 
+/// How much of a file that is uploaded in parts is there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PartsReceived {
+    /// Bytes that are there from the first on, without a gap.
+    pub received: u64,
+    /// Bytes of the whole file.
+    pub bytes: u64,
+}
+
 /// What is in an uploaded file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SceneReport {

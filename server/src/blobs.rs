@@ -32,6 +32,8 @@ pub enum BlobName {
     Handed(LeaseId),
     /// An uploaded file.
     Scene(BlobId),
+    /// Some bytes of a file that is uploaded in parts: from the first number on, before the second.
+    Part(BlobId, u64, u64),
     /// The partial EXR of a batch. Its sum's hash is in the name: a sum that differs never
     /// replaces one that counts.
     Partial(JobId, BatchKey, BlobId),
@@ -51,6 +53,7 @@ impl fmt::Display for BlobName {
             Self::Incoming(name) => write!(f, "incoming/{name}"),
             Self::Handed(lease) => write!(f, "incoming/{lease}.exr"),
             Self::Scene(id) => write!(f, "scenes/{id}"),
+            Self::Part(id, from, to) => write!(f, "{}/{from}-{to}", BlobFolder::Parts(id.clone())),
             Self::Partial(job, BatchKey { block, replicate, region }, hash) => {
                 let hash = &hash.as_str()[..16];
                 write!(f, "{}/{region}-{replicate}-{block}-{hash}.exr", BlobFolder::Partials(job.clone()))
@@ -72,6 +75,10 @@ impl fmt::Display for BlobName {
 pub enum BlobFolder {
     /// Uploads that have no name yet.
     Incoming,
+    /// Parts of all files that are uploaded in parts.
+    AllParts,
+    /// Parts of one of them.
+    Parts(BlobId),
     /// All of a job.
     Job(JobId),
     /// Its partials.
@@ -84,6 +91,8 @@ impl fmt::Display for BlobFolder {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Incoming => f.write_str("incoming"),
+            Self::AllParts => f.write_str("parts"),
+            Self::Parts(id) => write!(f, "parts/{id}"),
             Self::Job(job) => write!(f, "jobs/{job}"),
             Self::Partials(job) => write!(f, "jobs/{job}/partials"),
             Self::Prefixes(job) => write!(f, "jobs/{job}/prefix"),
@@ -246,6 +255,19 @@ impl Blobs {
             }
         }
         Ok(())
+    }
+
+    /// Parts of a file that are there, by where they begin.
+    pub async fn parts(&self, id: &BlobId) -> Result<Vec<(u64, u64)>> {
+        let folder = self.key(&BlobFolder::Parts(id.clone()));
+        let listed: Vec<ObjectMeta> = self.store.list(Some(&folder)).try_collect().await?;
+        let range = |meta: &ObjectMeta| {
+            let (from, to) = meta.location.filename()?.split_once('-')?;
+            Some((from.parse().ok()?, to.parse().ok()?))
+        };
+        let mut parts: Vec<(u64, u64)> = listed.iter().filter_map(range).collect();
+        parts.sort_unstable();
+        Ok(parts)
     }
 
     /// Jobs that have blobs.

@@ -2,6 +2,7 @@
 
 pub mod api;
 pub mod blobs;
+pub mod fail_point;
 pub mod farm;
 pub mod inspect;
 pub mod plot;

@@ -4,12 +4,20 @@ mod command;
 
 use clap::Parser as _;
 use command::{exit::Exit, line::Line, terminal};
+use ovtigre::fail_point;
 use ovtigre_worker::flags::usage;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
     if let Err(lack) = ovtigre_worker::processor::check() {
         terminal::error(&lack);
+        return Exit::Wrong.into();
+    }
+    if cfg!(debug_assertions)
+        && let Ok(place) = std::env::var("OVTIGRE_FAIL_POINT")
+        && let Err(wrong) = fail_point::choose(&place)
+    {
+        terminal::error(&wrong);
         return Exit::Wrong.into();
     }
     match Line::try_parse() {

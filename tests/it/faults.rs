@@ -21,7 +21,7 @@ fn plain() -> Settings {
 }
 
 /// What `core` alone says of a scene: the channels of the picture, of its layers and of their errors.
-fn undisturbed(glb: &[u8], settings: &Settings, samples: u32) -> Layers {
+pub(crate) fn undisturbed(glb: &[u8], settings: &Settings, samples: u32) -> Layers {
     let picture = rendered(glb, settings, samples / 4).picture();
     let [width, height] = [picture.size.width, picture.size.height].map(|side| side as usize);
     let mut layers = Layers { width, height, ..Layers::default() };

@@ -22,7 +22,7 @@ const ROOMS: [&str; 13] = [
     "render",
 ];
 /// Rooms of the `server` library, bottom to top.
-const SERVER_ROOMS: [&str; 7] = ["store", "blobs", "farm", "inspect", "api", "tls", "serve"];
+const SERVER_ROOMS: [&str; 8] = ["fail_point", "store", "blobs", "farm", "inspect", "api", "tls", "serve"];
 /// What `film` may not know though it stands above it: a sum does not know what a scene is made of.
 const STRANGERS: [(&str, &str); 4] =
     [("film", "trace"), ("film", "bsdf"), ("trace", "bsdf"), ("gltf", "sampler")];

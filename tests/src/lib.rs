@@ -1,14 +1,19 @@
 //! What the tests share: scenes made by code, and renders of them without a farm.
 
+pub mod browser;
 pub mod calibration;
+pub mod clock;
 pub mod glb;
 pub mod irradiance;
 pub mod matrix;
 pub mod picture;
 pub mod program;
+pub mod proxy;
 pub mod room;
 pub mod scenes;
 pub mod services;
 pub mod showcase;
+pub mod stability;
 pub mod stage;
+pub mod tended;
 pub mod textures;

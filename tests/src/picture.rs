@@ -20,7 +20,8 @@ use ovtigre_core::{
     },
 };
 
-fn mean_and_error(means: &[f64]) -> (f64, f64) {
+/// Mean of replicates, and its standard error.
+pub fn mean_and_error(means: &[f64]) -> (f64, f64) {
     let r = means.len() as f64;
     let mean = means.iter().sum::<f64>() / r;
     let variance = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (r * (r - 1.0));
@@ -81,7 +82,11 @@ pub struct Rendered {
 
 /// Renders `samples` samples a pixel and replicate, in one process.
 pub fn rendered(glb: &[u8], settings: &Settings, samples: u32) -> Rendered {
-    let scene = scene(glb, settings);
+    rendered_of(&scene(glb, settings), settings, samples)
+}
+
+/// The same of a scene that is prepared already.
+pub fn rendered_of(scene: &Prepared, settings: &Settings, samples: u32) -> Rendered {
     let planes = settings.layers.len() + 1;
     let schedule = Schedule::new(settings.size.frame(), planes as u32, settings.replicates, samples);
     let prefixes = (0..schedule.regions().len())
@@ -91,7 +96,7 @@ pub fn rendered(glb: &[u8], settings: &Settings, samples: u32) -> Rendered {
                     let mut prefix = Prefix::empty(schedule.regions()[region], replicate, planes);
                     for block in 0..schedule.blocks().len() {
                         let batch = schedule.batch(region, replicate, block).expect("in the schedule");
-                        let sum = render(&scene, settings, batch, &Progress::new()).expect("not stopped");
+                        let sum = render(scene, settings, batch, &Progress::new()).expect("not stopped");
                         prefix.append(&sum).expect("in order");
                     }
                     prefix
@@ -116,6 +121,17 @@ impl Rendered {
     /// Samples dropped.
     pub fn invalid(&self) -> u64 {
         self.prefixes.iter().flatten().map(|p| p.invalid().total()).sum()
+    }
+
+    /// Samples taken, of all pixels and replicates.
+    pub fn samples(&self) -> u64 {
+        let of = |p: &Prefix| u64::from(p.samples()) * p.region().pixels() as u64;
+        self.prefixes.iter().flatten().map(of).sum()
+    }
+
+    /// Rays traced.
+    pub fn rays(&self) -> u64 {
+        self.prefixes.iter().flatten().map(Prefix::rays).sum()
     }
 
     /// Mean over all pixels and channels, and its standard error from the spread between replicates.

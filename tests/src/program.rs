@@ -17,6 +17,25 @@ fn program() -> PathBuf {
     program
 }
 
+/// The program, to be given arguments.
+pub fn command() -> Command {
+    Command::new(program())
+}
+
+/// Starts a worker of one thread for the farm at an address.
+pub fn worker_of(url: &str) -> Process {
+    worker_with(url, &[])
+}
+
+/// The same with further variables.
+pub fn worker_with(url: &str, environment: &[(String, String)]) -> Process {
+    let mut work = command();
+    work.envs(environment.iter().map(|(name, value)| (name, value)));
+    work.args(["work", "--threads", "1", "--server", url]);
+    let work = work.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    Process(work.spawn().expect("the program starts"))
+}
+
 /// Runs a command to its end.
 pub fn run<S: AsRef<OsStr>>(arguments: impl IntoIterator<Item = S>) -> Output {
     Command::new(program()).args(arguments).stdin(Stdio::null()).output().expect("the program starts")
@@ -64,15 +83,32 @@ impl Farm {
 
     /// Starts a farm over a folder, with further flags.
     pub fn start_with(data: &Path, further: &[&str]) -> Self {
-        let mut child = Command::new(program())
-            .args(["serve", "--listen", "127.0.0.1:0", "--data"])
-            .arg(data)
-            .args(further)
-            .stdin(Stdio::null())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()
-            .expect("the program starts");
+        Self::start_as(command(), data, further)
+    }
+
+    /// Starts a farm in a folder that is a small disk of its own, of so many MiB; `None` where that is not allowed. The disk
+    /// goes away with the process.
+    pub fn start_on_a_disk(data: &Path, mib: u32, further: &[&str]) -> Option<Self> {
+        let allowed = Command::new("unshare").args(["-rm", "mount", "-t", "tmpfs", "none", "/mnt"]).output();
+        if !allowed.is_ok_and(|tried| tried.status.success()) {
+            return None;
+        }
+        std::fs::create_dir_all(data).expect("a folder");
+        let mut serve = Command::new("unshare");
+        let script = format!("mount -t tmpfs -o size={mib}m none \"$0\" && exec \"$@\"");
+        serve.args(["-rm", "sh", "-c", &script]).arg(data).arg(program());
+        Some(Self::start_as(serve, data, further))
+    }
+
+    /// The root of the farm's files, as it sees them.
+    pub fn root(&self) -> PathBuf {
+        PathBuf::from(format!("/proc/{}/root", self.process.0.id()))
+    }
+
+    fn start_as(mut serve: Command, data: &Path, further: &[&str]) -> Self {
+        serve.args(["serve", "--listen", "127.0.0.1:0", "--data"]).arg(data).args(further);
+        serve.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::null());
+        let mut child = serve.spawn().expect("the program starts");
         let mut line = String::new();
         let stdout = child.stdout.take().expect("piped");
         BufReader::new(stdout).read_line(&mut line).expect("the farm says where it listens");
@@ -84,16 +120,24 @@ impl Farm {
         self.process.kill();
     }
 
+    /// Seconds of processor time that its process has taken, and the most bytes that it ever had in memory.
+    pub fn cost(&self) -> (f64, u64) {
+        let about = |file| {
+            std::fs::read_to_string(format!("/proc/{}/{file}", self.process.0.id())).expect("it is there")
+        };
+        let stat = about("stat");
+        let after_name = stat.rsplit(')').next().expect("a line").split_whitespace();
+        // User and system time, in hundredths of a second on every Linux.
+        let ticks: f64 = after_name.skip(11).take(2).map(|t| t.parse::<f64>().expect("a number")).sum();
+        let status = about("status");
+        let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).expect("a line of memory");
+        let kib: u64 = peak.trim().trim_end_matches(" kB").parse().expect("a number");
+        (ticks / 100.0, kib << 10)
+    }
+
     /// Starts a worker of one thread.
     pub fn worker(&self) -> Process {
-        let child = Command::new(program())
-            .args(["work", "--threads", "1", "--server", &self.url])
-            .stdin(Stdio::null())
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .spawn()
-            .expect("the program starts");
-        Process(child)
+        worker_of(&self.url)
     }
 
     /// Runs a client's command to its end and returns what it wrote; it must succeed.

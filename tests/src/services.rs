@@ -33,6 +33,16 @@ impl Shared {
         Some(Self { database, blobs: format!("{bucket}/{name}") })
     }
 
+    /// Address of the database.
+    pub fn database(&self) -> &str {
+        &self.database
+    }
+
+    /// Where the S3-compatible server is.
+    pub fn endpoint() -> String {
+        env::var("AWS_ENDPOINT_URL").expect("set beside the bucket")
+    }
+
     /// Flags of `ovtigre serve`.
     pub fn flags(&self) -> [&str; 4] {
         ["--database", &self.database, "--blobs", &self.blobs]

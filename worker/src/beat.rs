@@ -11,7 +11,10 @@ use ovtigre_proto::{
     id::WorkerId,
     lease::{Exchange, ExchangeReply, WorkerJoin},
 };
-use std::time::{Duration, Instant};
+use std::{
+    sync::atomic::{AtomicU64, Ordering},
+    time::{Duration, Instant},
+};
 use tokio::sync::watch;
 
 /// A farm that cannot be reached is asked again at most this often in the log.
@@ -32,6 +35,13 @@ pub struct Beat<'a> {
     pub bell: &'a Bell,
     /// Its name on the farm, once it has one.
     pub id: &'a watch::Sender<Option<WorkerId>>,
+    /// Exchanges that were begun.
+    pub beats: AtomicU64,
+}
+
+/// Whether who answers is no farm at all.
+fn is_strange(error: &ClientError) -> bool {
+    matches!(error, ClientError::Unexpected { status: None, .. })
 }
 
 impl Beat<'_> {
@@ -40,6 +50,7 @@ impl Beat<'_> {
         let mut backoff = self.client.backoff();
         let mut complained: Option<Instant> = None;
         loop {
+            let known = self.id.borrow().is_some();
             let wait = match self.once().await {
                 Ok(interval) => {
                     if complained.take().is_some() {
@@ -58,7 +69,8 @@ impl Beat<'_> {
                     self.id.send_replace(None);
                     Duration::ZERO
                 }
-                Err(error) if error.may_pass() => {
+                // Something else may stand for a moment where a farm stood that knew this worker.
+                Err(error) if error.may_pass() || known && is_strange(&error) => {
                     if complained.is_none_or(|at| at.elapsed() > COMPLAINT) {
                         tracing::warn!(%error, "trying again");
                         complained = Some(Instant::now());
@@ -87,6 +99,7 @@ impl Beat<'_> {
             wants: if staying { self.desk.wants() } else { 0 },
             scenes: self.scenes.at_hand(),
             leaving: !staying,
+            beat: self.beats.fetch_add(1, Ordering::Relaxed) + 1,
         };
         let asked = Instant::now();
         let reply = self.client.exchange(&id, &exchange).await?;

@@ -52,9 +52,10 @@ pub async fn bring(client: Client, desk: Arc<Desk>, rendered: Rendered) {
     let sum = match partial.await {
         Ok(sum) => sum,
         Err(error) => {
+            let reason = format!("writing a sum failed: {error}");
+            give_back(&client, &lease, FailureKind::Worker, reason).await;
             desk.remove(&lease);
-            return give_back(&client, &lease, FailureKind::Worker, format!("writing a sum failed: {error}"))
-                .await;
+            return;
         }
     };
     if let Some(url) = upload

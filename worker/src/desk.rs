@@ -83,6 +83,11 @@ impl Desk {
         self.freed.notify_one();
     }
 
+    /// Whether a batch is on it.
+    pub fn holds(&self, id: &LeaseId) -> bool {
+        self.held().iter().any(|held| held.work.lease.id == *id)
+    }
+
     /// Takes a batch off; whether it was there.
     pub fn remove(&self, id: &LeaseId) -> bool {
         let mut held = self.held();

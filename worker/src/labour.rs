@@ -115,8 +115,10 @@ impl<R: Renderer> Labour<R> {
             }
             Ok(None) => None,
             Err(Failed { kind, reason }) => {
-                if self.desk.remove(&lease) {
+                // Held until the farm knows why: what a worker does not hold any more is anybody's.
+                if self.desk.holds(&lease) {
                     give_back(&self.client, &lease, kind, reason).await;
+                    self.desk.remove(&lease);
                 }
                 None
             }

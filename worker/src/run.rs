@@ -15,7 +15,7 @@ use ovtigre_proto::{
     lease::{Exchange, WorkerJoin},
 };
 use std::{
-    sync::{Arc, Mutex},
+    sync::{Arc, Mutex, atomic::AtomicU64},
     time::Duration,
 };
 use tokio::sync::watch;
@@ -75,11 +75,12 @@ pub async fn run_with<R: Renderer>(config: Config, renderer: R, bell: Bell) -> R
         pool,
     });
     let id = watch::Sender::new(None);
-    let beat = Beat { client: &client, join: &join, desk: &desk, scenes: &scenes, bell: &bell, id: &id };
+    let (bell, desk, beats) = (&bell, &desk, AtomicU64::new(0));
+    let beat = Beat { client: &client, join: &join, desk, scenes: &scenes, bell, id: &id, beats };
     tokio::select! {
         refused = beat.run() => return Err(refused),
-        () = labour.run(&bell) => {}
-        () = too_late(&bell) => {}
+        () = labour.run(bell) => {}
+        () = too_late(bell) => {}
     }
     let id = id.borrow().clone();
     if let Some(id) = id {

@@ -46,7 +46,8 @@ pub fn fifth_power(x: f32) -> f32 {
 /// refractive index of the far side over that of this one. Not positive: total internal reflection.
 #[inline]
 pub fn refracted_cos_squared(cos: f32, eta: f32) -> f32 {
-    1.0 - (1.0 - cos * cos).max(0.0) / (eta * eta)
+    // 1 − (1 − cos²) / η² without a difference of numbers near one: η − 1 has no rounding error where that matters.
+    ((eta - 1.0) * (eta + 1.0) + (cos * cos).min(1.0)) / (eta * eta)
 }
 
 /// Unpolarised reflectance of a dielectric (Fresnel), exact; arguments as in

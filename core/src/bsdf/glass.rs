@@ -159,6 +159,13 @@ impl Interface {
         if wo.z > 0.0 || self.walls == Walls::Thin { self.ior } else { 1.0 / self.ior }
     }
 
+    /// The same without a rounding error: seen from the two sides, one is the inverse of the other.
+    #[inline]
+    pub(super) fn exact_eta(&self, wo: Vec3) -> f64 {
+        let ior = f64::from(self.ior);
+        if wo.z > 0.0 || self.walls == Walls::Thin { ior } else { 1.0 / ior }
+    }
+
     /// For the cosine between `wo` and the facet's normal.
     #[inline]
     pub(super) fn facet(&self, cos: f32, eta: f32) -> Facet {

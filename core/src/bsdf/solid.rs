@@ -24,6 +24,8 @@ struct Pair {
     stretched: [f32; 2],
     /// Index of the far side over that of the side of `wo`.
     eta: f32,
+    /// The same, in f64: its inverse seen from the other side.
+    exact_eta: f64,
 }
 
 impl Solid {
@@ -40,7 +42,9 @@ impl Solid {
     ) -> Evaluated {
         let stretched = [self.ggx.stretched(wo), self.ggx.stretched(wi)];
         let eta = interface.eta(wo);
-        let pair = Pair { wo: wo.with_z(wo.z.abs()), wi: wi.with_z(wi.z * wo.z.signum()), stretched, eta };
+        let exact_eta = interface.exact_eta(wo);
+        let (above, other) = (wo.with_z(wo.z.abs()), wi.with_z(wi.z * wo.z.signum()));
+        let pair = Pair { wo: above, wi: other, stretched, eta, exact_eta };
         let (mut glossy, mut pdf) =
             if pair.wi.z > 0.0 { self.reflected(interface, &pair) } else { self.refracted(interface, &pair) };
         if let Some(between) = &self.between {
@@ -59,7 +63,7 @@ impl Solid {
 
     /// Flux f · cos θᵢ and density of a single scattering.
     fn reflected(&self, interface: &Interface, pair: &Pair) -> (Rgb, f32) {
-        let &Pair { wo, wi, stretched: [stretched_o, stretched_i], eta } = pair;
+        let &Pair { wo, wi, stretched: [stretched_o, stretched_i], eta, .. } = pair;
         let half = wo + wi;
         let length2 = half.length_squared();
         if length2 < f32::MIN_POSITIVE {
@@ -74,22 +78,25 @@ impl Solid {
 
     /// Flux f · |cos θᵢ| and density of a single refraction.
     fn refracted(&self, interface: &Interface, pair: &Pair) -> (Rgb, f32) {
-        let &Pair { wo, wi, stretched: [stretched_o, stretched_i], eta } = pair;
-        // The half vector of refraction; its length is |wo·h + η wi·h|.
-        let half = wo + wi * eta;
+        let &Pair { wo, wi, stretched: [stretched_o, stretched_i], eta, exact_eta } = pair;
+        // The half vector of refraction; its length is |wo·h + η wi·h|. Where indices are nearly alike, or a direction is
+        // nearly in the facet, f32 would know it to three digits only, and other ones from the other side.
+        let (o, i) = (wo.as_dvec3(), wi.as_dvec3());
+        let half = o + i * exact_eta;
         let length2 = half.length_squared();
-        if length2 < f32::MIN_POSITIVE {
+        if length2 < f64::from(f32::MIN_POSITIVE) {
             return (Rgb::ZERO, 0.0);
         }
         let normal = half * (half.z.signum() / length2.sqrt());
-        let (dot_o, dot_i) = (wo.dot(normal), -wi.dot(normal));
+        let (dot_o, dot_i) = (o.dot(normal) as f32, -i.dot(normal) as f32);
         if dot_o <= 0.0 || dot_i <= 0.0 {
             return (Rgb::ZERO, 0.0);
         }
         let facet = interface.facet_of(dielectric_between(dot_o, dot_i, eta));
         let Some(chance) = facet.chance_of_reflection() else { return (Rgb::ZERO, 0.0) };
         // D times the change of measure from normals to directions.
-        let density = self.ggx.density(half, length2) * dot_o * dot_i * (eta * eta / length2);
+        let jacobian = (exact_eta * exact_eta / length2) as f32;
+        let density = self.ggx.density(normal.as_vec3(), 1.0) * dot_o * dot_i * jacobian;
         let shape = 4.0 * density * -wi.z * Ggx::visibility(wo.z, stretched_o, -wi.z, stretched_i);
         (facet.transmitted * shape, (1.0 - chance) * density * Ggx::visible(wo.z, stretched_o))
     }

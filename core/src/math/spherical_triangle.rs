@@ -1,6 +1,11 @@
 //! Triangles seen from a point: solid angle, and directions uniform over it.
 
-use glam::{Vec2, Vec3};
+use core::f64::consts::PI;
+use glam::{DVec3, Vec2, Vec3};
+
+/// Where 1 + cos of the arc between two corners is below this, its great circle is hardly known in f32: then all is computed in
+/// f64. Next to a square lamp 10⁴ times as large as it is far, 3 % of the light was lost.
+const OPPOSITE: f32 = 1e-2;
 
 /// A triangle projected on the unit sphere around a point.
 #[derive(Clone, Copy, Debug)]
@@ -10,6 +15,8 @@ pub struct SphericalTriangle {
     /// (van Oosterom and Strackee 1983).
     g: [f32; 3],
     solid_angle: f32,
+    /// The directions that it was made of, where two of them are nearly opposite.
+    opposite: Option<[Vec3; 3]>,
 }
 
 impl SphericalTriangle {
@@ -21,9 +28,13 @@ impl SphericalTriangle {
         // Differences of the corners keep the determinant exact for small triangles.
         let determinant = u.dot((v - u).cross(w - u)).abs();
         let g = [determinant, (u + v).dot(w), 1.0 + u.dot(v)];
+        if g[2].min(1.0 + u.dot(w)).min(1.0 + v.dot(w)) < OPPOSITE {
+            let solid_angle = Wide::new(directions).solid_angle as f32;
+            return Some(Self { corners, g, solid_angle, opposite: Some(directions) });
+        }
         let half = libm::atan2f(g[0], g[1] + g[2]);
         let solid_angle = 2.0 * if half < 0.0 { half + core::f32::consts::PI } else { half };
-        Some(Self { corners, g, solid_angle })
+        Some(Self { corners, g, solid_angle, opposite: None })
     }
 
     /// In steradians, 0 to 2π for a plane triangle.
@@ -36,6 +47,9 @@ impl SphericalTriangle {
     /// 1995, without inverse trigonometry as in Peters 2021, "BRDF Importance Sampling for
     /// Polygonal Lights", §4).
     pub fn sample(&self, u: Vec2) -> Vec3 {
+        if let Some(directions) = self.opposite {
+            return Wide::new(directions).sample(u);
+        }
         let [a, b, c] = self.corners;
         let (sin, cos) = libm::sincosf(0.5 * u.x * self.solid_angle);
         // The direction half way between `a` and the third corner of the smaller triangle.
@@ -45,6 +59,37 @@ impl SphericalTriangle {
         let s = 1.0 + u.y * (cos_arc - 1.0);
         let t = ((1.0 - s * s).max(0.0) / (1.0 - cos_arc * cos_arc).max(f32::MIN_POSITIVE)).sqrt();
         (b * (s - t * cos_arc) + third * t).normalize_or(a)
+    }
+}
+
+/// The same in f64.
+struct Wide {
+    corners: [DVec3; 3],
+    g: [f64; 3],
+    solid_angle: f64,
+}
+
+impl Wide {
+    #[cold]
+    fn new(directions: [Vec3; 3]) -> Self {
+        let corners = directions.map(|d| d.as_dvec3().normalize());
+        let [u, v, w] = corners;
+        let determinant = u.dot((v - u).cross(w - u)).abs();
+        let g = [determinant, (u + v).dot(w), 1.0 + u.dot(v)];
+        let half = libm::atan2(g[0], g[1] + g[2]);
+        Self { corners, g, solid_angle: 2.0 * if half < 0.0 { half + PI } else { half } }
+    }
+
+    #[cold]
+    fn sample(&self, u: Vec2) -> Vec3 {
+        let [a, b, c] = self.corners;
+        let (sin, cos) = libm::sincos(0.5 * f64::from(u.x) * self.solid_angle);
+        let half = a * (self.g[0] * cos - self.g[1] * sin) + c * (self.g[2] * sin);
+        let third = half * (2.0 * a.dot(half) / half.length_squared()) - a;
+        let cos_arc = b.dot(third);
+        let s = 1.0 + f64::from(u.y) * (cos_arc - 1.0);
+        let t = ((1.0 - s * s).max(0.0) / (1.0 - cos_arc * cos_arc).max(f64::MIN_POSITIVE)).sqrt();
+        (b * (s - t * cos_arc) + third * t).normalize_or(a).as_vec3()
     }
 }
 

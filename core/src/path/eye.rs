@@ -79,6 +79,7 @@ pub fn from_eye<'a, C: Carriage>(
     let edge = Edge { ray, from: ray.origin, cos, density, kind };
     let partial = Partial { near, far: 0.0 };
     let mut walk = Walk::new((scene, rules, sampler), Transport::Radiance, edge, carried, partial);
+    walk.media = rules.media_of_eye(scene, &ray);
     if walk.keeps_links() {
         walk.links.push(Link { forward: 1.0, reverse: 0.0, jacobian: 0.0, specular: false });
     }

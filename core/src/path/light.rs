@@ -7,6 +7,7 @@ use crate::path::connect::lens::{Shown, hit_lens, light_to_lens, to_lens};
 use crate::path::connect::light_vertex::{LightStart, LightVertex};
 use crate::path::connect::unblocked;
 use crate::path::expression::language::LightState;
+use crate::path::media::Media;
 use crate::path::mis::exhaustive::Link;
 use crate::path::mis::partial::Partial;
 use crate::path::rules::Rules;
@@ -114,8 +115,12 @@ pub fn from_light<'a, C: Carriage>(
     let Some(emission) = origin.place.emit(&scene.data, choice.y, pair(StartUse::Direction)) else {
         return Vec::new();
     };
-    let (walk, mut visitor) =
+    let is_near = !origin.place.is_distant();
+    let (mut walk, mut visitor) =
         set_out::<C>((scene, rules), (sampler, moment), origin, &emission, state, keeps);
+    if is_near {
+        walk.media = Media::around(scene, emission.ray.origin, moment, &mut tally.rays);
+    }
     walk.run(&mut visitor, tally);
     visitor.vertices
 }
@@ -168,7 +173,7 @@ fn show<C: Carriage>(
             let Some(seen) = view.see(at.position, lens) else { return };
             let radiance = at.emission(at.side(seen.direction)) * at.alpha();
             let start = at.leave(seen.direction);
-            let ray = Ray { origin: start, direction: seen.end - start, t_max: 1.0, moment };
+            let ray = Ray { origin: seen.end, direction: start - seen.end, t_max: 1.0, moment };
             let squared = squared_distance(seen.end, at.position);
             (seen, radiance, ray, squared, cosine(seen.direction, at.ng))
         }
@@ -184,7 +189,12 @@ fn show<C: Carriage>(
     let passes = unblocked::along(scene, &ray, tally);
     if passes > 0.0 {
         let place = f64::from(origin.pdf);
-        let radiance: Rgb = radiance / origin.pdf;
+        let media = match &origin.place {
+            Place::Surface(at) => Media::around(scene, at.leave(seen.direction), moment, &mut tally.rays),
+            _ => Media::VACUUM,
+        };
+        let left = media.transmittance(ray.direction.length());
+        let radiance: Rgb = radiance / origin.pdf * left;
         let environment = scene.environment.as_ref();
         let towards = -seen.direction;
         let emission =

@@ -139,8 +139,8 @@ impl Course {
     }
 
     /// Whether such a path shows more than the image of a point: that has no extent and is never seen.
-    fn is_seen(self, light: LightKind, eye: EyeKind) -> bool {
-        light != LightKind::Punctual || eye == EyeKind::Lens || self.some
+    fn is_seen(self, light: LightKind) -> bool {
+        light != LightKind::Punctual || self.some
     }
 }
 
@@ -212,7 +212,7 @@ impl<'l> Search<'l> {
             let light = self.language.light_start(*tag);
             light.is_some_and(|light| !self.language.accepts(self.states[state], light).is_empty())
         };
-        course.is_seen(self.light, self.eye) && self.tags.iter().any(asked)
+        course.is_seen(self.light) && self.tags.iter().any(asked)
     }
 
     fn report(&self, method: Method, bounces: Option<u32>) -> Option<Unreachable> {
@@ -402,8 +402,7 @@ mod tests {
                 let asked: Vec<Vec<Letter>> = (words(letters).into_iter())
                     .filter(|word| !language.accepts_word(LightTag::UNNAMED, word).is_empty())
                     .filter(|word| {
-                        let point = light == LightKind::Punctual && eye != EyeKind::Lens;
-                        !(point && word.iter().all(|letter| letter.is_delta()))
+                        !(light == LightKind::Punctual && word.iter().all(|letter| letter.is_delta()))
                     })
                     .collect();
                 for method in METHODS {

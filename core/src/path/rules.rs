@@ -4,6 +4,7 @@ use crate::bsdf::Bsdf;
 use crate::bsdf::event::Letters;
 use crate::path::expression::error::ExpressionError;
 use crate::path::expression::language::{Language, LightTag};
+use crate::path::media::Media;
 use crate::path::mis::exhaustive::Chosen;
 use crate::path::mis::heuristic::Heuristic;
 use crate::path::tally::Technique;
@@ -12,6 +13,8 @@ use crate::scene::interaction::Interaction;
 use crate::scene::light::Light;
 use crate::scene::material::Material;
 use crate::settings::{Gloss, Method, Settings, Shadows, Shows, Strategy, Weights};
+use crate::trace::moment::Moment;
+use crate::trace::ray::Ray;
 use glam::Vec4;
 
 /// Most light subpaths of a pass of photons.
@@ -45,6 +48,8 @@ pub struct Rules {
     narrow_plane: Option<usize>,
     /// What a material does to light, by its number; `None` where textures tell.
     even: Vec<Option<Bsdf>>,
+    /// The solids around the eye, where all its rays start at one point.
+    media_of_eye: Option<Media>,
 }
 
 /// How techniques share a path.
@@ -94,7 +99,13 @@ impl Rules {
             rule_planes,
             technique_planes,
             narrow_plane,
+            media_of_eye: scene.eye().map(|eye| Media::around(scene, eye, Moment::STILL, &mut 0)),
         })
+    }
+
+    /// The solids around the start of a ray from the eye.
+    pub fn media_of_eye(&self, scene: &Scene, ray: &Ray) -> Media {
+        self.media_of_eye.unwrap_or_else(|| Media::around(scene, ray.origin, ray.moment, &mut 0))
     }
 
     /// What the surface does to light at a point, where that is the same all over its material.

@@ -23,11 +23,16 @@ use glam::Vec3;
 /// 9 on: a Cornell box 70, 51, 50; a hall with many lamps 26, 25, 26; a textured helmet 24, 12, 13.
 const ROULETTE_FROM: u32 = 5;
 
-/// Scatterings from which on a walk is also ended with probability 2 / n at its n-th: a walk that clear glass has trapped
-/// by total reflection loses nothing and would never end. The chance to reach n falls as n⁻², so a trapped walk ends after
-/// about twice this number on average, and the variance stays finite for every albedo below one, which a constant
-/// probability does not achieve.
-const LONG: u32 = 2048;
+/// Ideally specular scatterings in a row from which on a walk is also ended with probability 2 / n at its n-th: a walk that
+/// clear glass has trapped by total reflection loses nothing and would never end. The chance to reach n falls as n⁻², so a
+/// trapped walk ends after about twice this number on average, and the variance stays finite for every albedo below one,
+/// which a constant probability does not achieve.
+const TRAPPED: u32 = 2048;
+
+/// The same for scatterings of any kind, which end where nothing is lost at all, as in a closed white room. Mean walks of a
+/// room of reflectance ρ have 1 / (1 − ρ) scatterings; those that are much longer than this number have a relative error
+/// of 2 / (LONG (1 − ρ)) instead of one, 0.6 for ρ = 0.9999; from 2,048 on it would be 9.8.
+const LONG: u32 = 1 << 15;
 
 /// A walk, between two vertices.
 #[derive(Clone, Debug)]
@@ -50,6 +55,8 @@ pub struct Walk<'a, S: State, T: Throughput<S>> {
     pub media: Media,
     /// Scatterings so far.
     pub scatterings: u32,
+    /// The last of them that were ideally specular, in a row.
+    mirrored: u32,
     /// Whether all of them were ideally specular.
     pub sight: Sight,
     /// Its vertices so far, where weights are computed from all of them.
@@ -144,6 +151,7 @@ impl<'a, S: State, T: Throughput<S>> Walk<'a, S, T> {
             partial,
             media: Media::VACUUM,
             scatterings: 0,
+            mirrored: 0,
             sight: Sight::Clear,
             links: Vec::new(),
             transport,
@@ -253,8 +261,10 @@ impl<'a, S: State, T: Throughput<S>> Walk<'a, S, T> {
             Transport::Importance => 1.0,
         };
         self.scatterings += 1;
-        if next.density != Density::Delta {
-            self.sight = Sight::Scattered;
+        if next.density == Density::Delta {
+            self.mirrored += 1;
+        } else {
+            (self.sight, self.mirrored) = (Sight::Scattered, 0);
         }
         if self.scatterings >= ROULETTE_FROM && !self.survives(choice.y) {
             return false;
@@ -278,8 +288,10 @@ impl<'a, S: State, T: Throughput<S>> Walk<'a, S, T> {
     fn survives(&mut self, u: f32) -> bool {
         let throughput = self.carried.total().max_element() * self.eta_squared * self.scale;
         let mut survival = throughput.min(1.0);
-        if self.scatterings >= LONG {
-            survival *= 1.0 - 2.0 / self.scatterings as f32;
+        for (count, most) in [(self.mirrored, TRAPPED), (self.scatterings, LONG)] {
+            if count >= most {
+                survival *= 1.0 - 2.0 / count as f32;
+            }
         }
         if u >= survival {
             return false;

@@ -65,6 +65,11 @@ impl SceneData {
         }
     }
 
+    /// Whether any solid absorbs.
+    pub fn absorbs(&self) -> bool {
+        self.materials.iter().any(|m| m.volume.is_some_and(|volume| volume.absorption != glam::Vec3::ZERO))
+    }
+
     /// Name of the node that a triangle of an instance comes from; may be empty.
     pub fn node_name(&self, instance: u32, triangle: u32) -> &str {
         let instance = &self.instances[instance as usize];

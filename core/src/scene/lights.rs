@@ -14,6 +14,7 @@ use crate::trace::moment::Moment;
 use core::f64::consts::PI;
 use glam::{Vec2, Vec3};
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 
 /// No light has this number.
 const NONE: u32 = u32::MAX;
@@ -32,11 +33,13 @@ pub struct Lights {
 }
 
 impl Lights {
-    /// The lights of a scene. What has no power is left out.
+    /// The lights of a scene. What has no power is left out; emitters that are alike and at one place, of which a ray
+    /// meets one, are one light.
     pub fn new(data: &SceneData, environment: Option<&Environment>) -> Self {
         let mut lights = Vec::new();
         let mut emitters = Vec::new();
         let mut powers = Vec::new();
+        let mut same = BTreeMap::new();
         let radiances: Vec<Rgb> = data.materials.iter().map(|m| mean_radiance(m, &data.textures)).collect();
         let mut by_triangle = vec![Vec::new(); data.instances.len()];
         for (i, instance) in data.instances.iter().enumerate() {
@@ -51,9 +54,16 @@ impl Lights {
                 if power > 0.0 && power.is_finite() {
                     let numbers: &mut Vec<u32> = &mut by_triangle[i];
                     numbers.resize(mesh.triangles.len(), NONE);
-                    numbers[t] = lights.len() as u32;
-                    lights.push(Light::Triangle { instance: i as u32, triangle: t as u32 });
-                    let place = (i as u32, t as u32);
+                    let (number, place) = (lights.len() as u32, (i as u32, t as u32));
+                    if let Some(key) = likeness(data, place) {
+                        let first = *same.entry(key).or_insert(number);
+                        if first != number {
+                            numbers[t] = first;
+                            continue;
+                        }
+                    }
+                    numbers[t] = number;
+                    lights.push(Light::Triangle { instance: place.0, triangle: place.1 });
                     emitters.push((!data.moves(place.0)).then(|| Emitter::new(data, place, Moment::STILL)));
                     powers.push(power);
                 }
@@ -189,6 +199,21 @@ impl Lights {
     pub fn environment_pdf(&self, environment: &Environment, direction: Vec3) -> f32 {
         self.environment.map_or(0.0, |light| environment.pdf(direction) * self.probability(light))
     }
+}
+
+/// What two triangles have in common of which a ray meets but one and finds the same light on it: corners in their order,
+/// and emission. `None` where that varies.
+fn likeness(data: &SceneData, (instance, triangle): (u32, u32)) -> Option<([[u32; 3]; 4], bool)> {
+    let material = data.material(instance, triangle);
+    if data.moves(instance) || !material.emits_evenly() {
+        return None;
+    }
+    let bits = |v: Vec3| (v + Vec3::ZERO).to_array().map(f32::to_bits);
+    let mut corners = data.corners(instance, triangle, Moment::STILL).map(bits);
+    let least = (0..3).min_by_key(|i| corners[*i]).unwrap_or(0);
+    corners.rotate_left(least);
+    let [a, b, c] = corners;
+    Some(([a, b, c, bits(material.emission.factor)], material.sides == Sides::Both))
 }
 
 /// π · area (its mean over the shutter's time) · mean luminance, for each side that emits.

@@ -34,6 +34,7 @@ use crate::trace::build_error::BuildError;
 use crate::trace::instance::Placement;
 use crate::trace::moment::Moment;
 use crate::trace::ray::{Hit, Ray};
+use glam::Vec3;
 use rayon::prelude::*;
 
 /// A scene that is ready to be rendered: its trees are built, its lights are gathered.
@@ -103,6 +104,11 @@ impl Scene {
     #[inline]
     pub fn view(&self, moment: Moment) -> View {
         self.views.at(moment)
+    }
+
+    /// Where all rays from the eye start at all moments, if that is one point.
+    pub fn eye(&self) -> Option<Vec3> {
+        if self.data.knots.is_still() { self.view(Moment::STILL).eye() } else { None }
     }
 
     /// The nearest surface on a ray. A surface of partial coverage is there with the probability of its alpha,

@@ -74,6 +74,11 @@ impl View {
         }
     }
 
+    /// Where all rays start, if that is one point.
+    pub fn eye(&self) -> Option<Vec3> {
+        matches!(self.projection, ViewProjection::Pinhole).then_some(self.position)
+    }
+
     /// The ray through a place in the frame (pixels from the upper left corner) and, with a lens, a place on it
     /// (unit square). Its direction has unit length.
     pub fn ray(&self, place: Vec2, lens: Vec2) -> Ray {

@@ -1,12 +1,14 @@
 //! One call, as data, so that it can be made again.
 
+use super::error::ClientError;
 use bytes::Bytes;
 use reqwest::{
     Method,
     header::{CONTENT_TYPE, HeaderMap, HeaderName, HeaderValue},
 };
 use serde::Serialize;
-use std::{path::PathBuf, time::Duration};
+use std::{io::SeekFrom, ops::Range, path::PathBuf, time::Duration};
+use tokio::io::{AsyncReadExt as _, AsyncSeekExt as _};
 
 /// Whether making a call twice is the same as making it once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,7 +36,28 @@ pub enum Payload {
 }
 
 impl Payload {
-    fn length(&self) -> u64 {
+    /// Some of its bytes.
+    pub(super) async fn range(&self, range: Range<u64>) -> Result<Bytes, ClientError> {
+        match self {
+            Self::Empty => Ok(Bytes::new()),
+            Self::Bytes(bytes) => Ok(bytes.slice(range.start as usize..range.end as usize)),
+            Self::File { path, .. } => {
+                let read = async {
+                    let mut file = tokio::fs::File::open(path).await?;
+                    file.seek(SeekFrom::Start(range.start)).await?;
+                    let mut bytes = vec![0; (range.end - range.start) as usize];
+                    file.read_exact(&mut bytes).await?;
+                    Ok(bytes.into())
+                };
+                read.await.map_err(|error: std::io::Error| ClientError::File {
+                    path: path.clone(),
+                    reason: error.to_string(),
+                })
+            }
+        }
+    }
+
+    pub(super) fn length(&self) -> u64 {
         match self {
             Self::Empty => 0,
             Self::Bytes(bytes) => bytes.len() as u64,

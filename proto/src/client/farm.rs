@@ -163,6 +163,10 @@ impl Client {
         };
         match tokio::time::timeout(call.patience(), request.send()).await {
             Err(_) => Err(self.unreachable("no answer in time".to_owned(), false)),
+            Ok(Err(e)) if speaks_otherwise(&e) => {
+                let error = ClientError::Unexpected { call: name, status: None, reason: innermost(&e) };
+                Err(Failure { error, again: false, after: None })
+            }
             Ok(Err(e)) => {
                 Err(self.unreachable(innermost(&e), e.is_connect() || call.repeat == Repeat::Harmless))
             }
@@ -177,6 +181,28 @@ impl Client {
         let error = ClientError::Unreachable { farm: self.address.to_string(), reason };
         Failure { error, again, after: None }
     }
+}
+
+/// Whether somebody answered who does not speak HTTP, or encrypts where this side does not, or the other way round, or
+/// whom this side does not believe: no patience helps then.
+fn speaks_otherwise(error: &reqwest::Error) -> bool {
+    let mut cause: Option<&(dyn std::error::Error + 'static)> = Some(error);
+    while let Some(inner) = cause {
+        if let Some(tls) = inner.downcast_ref::<rustls::Error>() {
+            return matches!(tls, rustls::Error::InvalidMessage(_) | rustls::Error::InvalidCertificate(_));
+        }
+        // The error of the HTTP library has no kinds that can be asked for.
+        if inner.to_string().starts_with("invalid HTTP") {
+            return true;
+        }
+        // Errors of encryption are within errors of reading.
+        let within = inner.downcast_ref::<std::io::Error>().and_then(|error| error.get_ref());
+        cause = match within {
+            Some(within) => Some(within),
+            None => inner.source(),
+        };
+    }
+    false
 }
 
 /// The part of an address that may be shown: what follows lets anybody write there.

@@ -92,6 +92,7 @@ impl From<FarmError> for ApiError {
             FarmError::NoPicture(_) => of(StatusCode::NOT_FOUND, "no-picture-yet", "No picture yet"),
             FarmError::NeverPicture(_) => of(StatusCode::NOT_FOUND, "no-picture", "No picture"),
             FarmError::NoLayer(_) => of(StatusCode::NOT_FOUND, "no-layer", "No such layer"),
+            FarmError::NoPixel { .. } => of(StatusCode::NOT_FOUND, "no-pixel", "No such pixel"),
             FarmError::TooManyJobs { .. } => {
                 of(StatusCode::TOO_MANY_REQUESTS, "too-many-jobs", "Too many jobs")
             }

@@ -1,4 +1,4 @@
-//! Probes, numbers, and the page.
+//! Probes and numbers.
 
 use super::error::Result;
 use crate::farm::{Farm, counters::Fate, error::FarmError};
@@ -6,7 +6,7 @@ use axum::{
     Json,
     extract::State,
     http::header,
-    response::{Html, IntoResponse as _, Response},
+    response::{IntoResponse as _, Response},
 };
 use ovtigre_proto::status::{JobState, Scaling, WorkerState};
 use std::{
@@ -29,14 +29,14 @@ pub async fn ready(State(farm): State<Arc<Farm>>) -> Result<&'static str> {
 }
 
 /// How many workers the queue could use now.
-pub async fn scaling(State(farm): State<Arc<Farm>>) -> Json<Scaling> {
-    Json(farm.scaling())
+pub async fn scaling(State(farm): State<Arc<Farm>>) -> Result<Json<Scaling>> {
+    Ok(Json(farm.scaling().await?))
 }
 
 /// Numbers for Prometheus (text format 0.0.4).
 pub async fn metrics(State(farm): State<Arc<Farm>>) -> Result<Response> {
     let counts = farm.store.counts().await.map_err(FarmError::from)?;
-    let scaling = farm.scaling();
+    let scaling = farm.scaling().await?;
     let mut text = Metrics::default();
     text.kind("ovtigre_jobs", "gauge", "Jobs by state.");
     for state in [
@@ -95,13 +95,4 @@ impl Metrics {
     fn labelled(&mut self, name: &str, label: &str, of: &str, value: impl Display) {
         self.line(format_args!("{name}{{{label}=\"{of}\"}} {value}"));
     }
-}
-
-/// The page.
-pub async fn page() -> Html<&'static str> {
-    Html(
-        "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>ovtigre</title><h1>ovtigre</h1>\
-         <p>A render farm whose pictures come with error bars.</p>\
-         <p><a href=\"/v1/jobs\">Jobs</a> · <a href=\"/v1/workers\">Workers</a> · <a href=\"/metrics\">Metrics</a></p></html>",
-    )
 }

@@ -7,11 +7,14 @@ use super::{
     params::{Named, Params, cursor, id, limit},
     tag,
 };
-use crate::farm::{Farm, spec::JobSpec};
+use crate::{
+    farm::{Farm, error::FarmError, spec::JobSpec},
+    store::row::JobFilter,
+};
 use axum::{
     Extension, Json,
     extract::State,
-    http::{HeaderMap, StatusCode, header},
+    http::{HeaderMap, HeaderValue, StatusCode, header},
     response::{IntoResponse as _, Response},
 };
 use ovtigre_core::{film::size::Region, settings::Settings};
@@ -19,10 +22,15 @@ use ovtigre_proto::{
     id::JobId,
     job::{JobPatch, JobRequest},
     route,
-    status::{JobState, JobStatus, Page},
+    status::{JobState, JobStatus},
 };
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
+
+/// Longest text that jobs are looked for by, in bytes.
+const TEXT_MAX: usize = 200;
+/// What is kept is asked for again before it is used.
+const NO_CACHE: HeaderValue = HeaderValue::from_static("no-cache");
 
 /// How a job is sent.
 #[derive(Debug, Deserialize)]
@@ -86,17 +94,31 @@ pub async fn create(
 #[serde(deny_unknown_fields)]
 pub struct ListParams {
     state: Option<JobState>,
+    text: Option<String>,
     limit: Option<u32>,
     cursor: Option<String>,
 }
 
-/// Jobs, the newest first.
+/// Jobs, the newest first. The tag is that of the answer's bytes, for those who ask again and again.
 pub async fn list(
     State(farm): State<Arc<Farm>>,
     Params(params): Params<ListParams>,
-) -> Result<Json<Page<JobStatus>>> {
+    headers: HeaderMap,
+) -> Result<Response> {
+    let ListParams { state, text, .. } = params;
+    if text.as_ref().is_some_and(|text| text.len() > TEXT_MAX) {
+        return Err(ApiError::parameter("text", format!("the text has more than {TEXT_MAX} bytes")));
+    }
+    let text = text.filter(|text| !text.is_empty());
     let before = cursor(params.cursor.as_deref())?;
-    Ok(Json(farm.jobs(params.state, before, limit(params.limit)?).await?))
+    let page = farm.jobs(JobFilter { state, text, before, limit: limit(params.limit)? }).await?;
+    let body = serde_json::to_vec(&page).map_err(|e| FarmError::Damaged(e.to_string()))?;
+    let name = blake3::hash(&body).to_hex();
+    let head = [(header::ETAG, tag::strong(&name)), (header::CACHE_CONTROL, NO_CACHE)];
+    if tag::none_match(&headers, &name) {
+        return Ok((StatusCode::NOT_MODIFIED, head).into_response());
+    }
+    Ok((head, [(header::CONTENT_TYPE, "application/json")], body).into_response())
 }
 
 /// A job.

@@ -10,7 +10,9 @@ pub mod health;
 pub mod image;
 pub mod jobs;
 pub mod leases;
+pub mod page;
 pub mod params;
+pub mod pixel;
 pub mod range;
 pub mod roles;
 pub mod scenes;
@@ -40,6 +42,7 @@ pub fn router(farm: Arc<Farm>, guarding: Guarding) -> Router {
         .route("/v1/jobs/{id}/events", get(events::stream))
         .route("/v1/jobs/{id}/image.exr", get(image::exr))
         .route("/v1/jobs/{id}/image.png", get(image::png))
+        .route("/v1/jobs/{id}/pixel", get(pixel::get))
         .route("/v1/jobs/{id}/error.json", get(curve::json))
         .route("/v1/jobs/{id}/error.csv", get(curve::csv))
         .route("/v1/jobs/{id}/error.svg", get(curve::svg))
@@ -52,7 +55,8 @@ pub fn router(farm: Arc<Farm>, guarding: Guarding) -> Router {
         .route("/healthz", get(health::alive))
         .route("/readyz", get(health::ready))
         .route("/metrics", get(health::metrics))
-        .route("/", get(health::page))
+        .route("/", get(page::index))
+        .merge(page::files())
         .fallback(error::no_route)
         .method_not_allowed_fallback(error::no_method)
         .layer(middleware::from_fn(carry_out::carry_out))

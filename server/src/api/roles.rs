@@ -32,6 +32,7 @@ pub const DOORS: [(Method, &str, Access); 28] = [
     (Method::GET, "/v1/jobs/{id}/events", READ),
     (Method::GET, "/v1/jobs/{id}/image.exr", READ),
     (Method::GET, "/v1/jobs/{id}/image.png", READ),
+    (Method::GET, "/v1/jobs/{id}/pixel", READ),
     (Method::GET, "/v1/jobs/{id}/error.json", READ),
     (Method::GET, "/v1/jobs/{id}/error.csv", READ),
     (Method::GET, "/v1/jobs/{id}/error.svg", READ),

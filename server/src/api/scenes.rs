@@ -6,12 +6,16 @@ use super::{
     params::{Named, id},
     tag,
 };
-use crate::farm::{Farm, scene::Novelty};
+use crate::farm::{
+    Farm,
+    parts::{Received, Span},
+    scene::Novelty,
+};
 use axum::{
     Json,
     body::{Body, HttpBody as _},
     extract::State,
-    http::{HeaderMap, StatusCode, header},
+    http::{HeaderMap, HeaderValue, StatusCode, header},
     response::{IntoResponse as _, Response},
 };
 use futures::StreamExt as _;
@@ -23,8 +27,13 @@ pub async fn create(State(farm): State<Arc<Farm>>, File(body): File) -> Result<R
     upload(&farm, body, None).await
 }
 
-/// An upload under its hash.
-pub async fn put(State(farm): State<Arc<Farm>>, Named(name): Named, File(body): File) -> Result<Response> {
+/// An upload under its hash: whole, or a part of it where there is a `Content-Range`.
+pub async fn put(
+    State(farm): State<Arc<Farm>>,
+    Named(name): Named,
+    headers: HeaderMap,
+    File(body): File,
+) -> Result<Response> {
     let named: BlobId = name.parse().map_err(|_| {
         let detail = format!(
             "'{}' is not a BLAKE3 hash of 64 hexadecimal digits",
@@ -45,7 +54,66 @@ pub async fn put(State(farm): State<Arc<Farm>>, Named(name): Named, File(body): 
             (StatusCode::OK, [(header::LOCATION, route::scene(&report.id))], Json(report)).into_response()
         );
     }
-    upload(&farm, body, Some(named)).await
+    match headers.get(header::CONTENT_RANGE) {
+        None => upload(&farm, body, Some(named)).await,
+        Some(range) => part(&farm, body, &named, content_range(range)?).await,
+    }
+}
+
+/// What a `Content-Range` says.
+enum ContentRange {
+    /// A part comes along.
+    Part(Span),
+    /// Nothing comes along: how much of so many bytes is there?
+    Ask(u64),
+}
+
+fn content_range(value: &HeaderValue) -> Result<ContentRange> {
+    let parse = || {
+        let (range, whole) = value.to_str().ok()?.trim().strip_prefix("bytes ")?.split_once('/')?;
+        let whole = whole.trim().parse().ok()?;
+        if range.trim() == "*" {
+            return Some(ContentRange::Ask(whole));
+        }
+        let (first, last) = range.split_once('-')?;
+        let (from, last): (u64, u64) = (first.trim().parse().ok()?, last.trim().parse().ok()?);
+        (from <= last && last < whole).then_some(ContentRange::Part(Span { from, to: last + 1, whole }))
+    };
+    parse().ok_or_else(|| {
+        let detail = "Content-Range is 'bytes FIRST-LAST/LENGTH', or 'bytes */LENGTH' to ask what is there";
+        ApiError::header(detail.to_owned())
+    })
+}
+
+/// A part of a file; told is how much is there, or, when all is there, what is in it.
+async fn part(farm: &Farm, body: Body, named: &BlobId, range: ContentRange) -> Result<Response> {
+    let span = match range {
+        ContentRange::Part(span) => span,
+        ContentRange::Ask(whole) => {
+            return Ok((StatusCode::ACCEPTED, Json(farm.received(named, whole).await?)).into_response());
+        }
+    };
+    let mut incoming = farm.receive_part(named, span).await?;
+    let mut pieces = body.into_data_stream();
+    while let Some(piece) = pieces.next().await {
+        let written = match piece {
+            Ok(piece) => incoming.write(piece).await.map_err(ApiError::from),
+            Err(error) => Err(cut_off(&error.to_string())),
+        };
+        if let Err(error) = written {
+            incoming.abort().await;
+            return Err(error);
+        }
+    }
+    match farm.take_part(named, incoming).await? {
+        Received::Some(received) => Ok((StatusCode::ACCEPTED, Json(received)).into_response()),
+        Received::All(report, novelty) => Ok(reported(*report, novelty)),
+    }
+}
+
+fn reported(report: SceneReport, novelty: Novelty) -> Response {
+    let status = if novelty == Novelty::New { StatusCode::CREATED } else { StatusCode::OK };
+    (status, [(header::LOCATION, route::scene(&report.id))], Json(report)).into_response()
 }
 
 async fn upload(farm: &Farm, body: Body, named: Option<BlobId>) -> Result<Response> {
@@ -65,8 +133,7 @@ async fn upload(farm: &Farm, body: Body, named: Option<BlobId>) -> Result<Respon
         }
     }
     let (report, novelty) = farm.take_in(incoming, named.as_ref()).await?;
-    let status = if novelty == Novelty::New { StatusCode::CREATED } else { StatusCode::OK };
-    Ok((status, [(header::LOCATION, route::scene(&report.id))], Json(report)).into_response())
+    Ok(reported(report, novelty))
 }
 
 /// What is in an uploaded file.

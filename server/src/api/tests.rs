@@ -633,6 +633,7 @@ async fn a_token_has_a_number_of_jobs_and_keys_of_its_own() {
     submit("b", "anna").await.unwrap();
     let refused = submit("c", "anna").await.unwrap_err();
     assert!(matches!(refused, FarmError::TooManyJobs { most: 2 }), "{refused}");
+    assert_eq!(submit("a", "anna").await.unwrap().id, first.id, "one that was taken is told of all the same");
     assert_ne!(submit("a", "otto").await.unwrap().id, first.id, "another's keys are another's");
     bench.farm.cancel(&first.id).await.unwrap();
     bench.until_settled(&first.id, JobState::Cancelled).await;

@@ -59,6 +59,9 @@ pub(crate) struct Serve {
     /// GiB on the disk that are kept free: below, nothing new is taken and no batch is handed out.
     #[arg(long, value_name = "GIB", default_value_t = 1.0, value_parser = not_negative)]
     reserve: f64,
+    /// Sums of a lane that are kept one by one before they are kept as one file.
+    #[arg(long, value_name = "N", default_value_t = 8, hide = true, value_parser = clap::value_parser!(u32).range(1..))]
+    partials_kept: u32,
     /// Jobs under way of one token, at most.
     #[arg(long, value_name = "N", default_value_t = 1000)]
     jobs_per_token: usize,
@@ -163,6 +166,7 @@ impl Serve {
             audit: self.audit,
             reserve_bytes: (self.reserve * f64::from(1 << 30)) as u64,
             jobs_per_token: self.jobs_per_token,
+            partials_kept: self.partials_kept,
             // Where blobs are elsewhere the disk is not what fills.
             room: Room::new(move || free_bytes(&disk)),
             ..Rules::default()

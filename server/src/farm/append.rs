@@ -10,6 +10,7 @@ use super::{
 };
 use crate::{
     blobs::{BlobError, BlobName},
+    fail_point::FailPoint,
     store::row::{BatchKey, CommitRow, Lane, Progress},
 };
 use bytes::Bytes;
@@ -37,7 +38,7 @@ pub struct Merge {
     pub checkpoints: u32,
     /// When it was needed last.
     pub used: Instant,
-    points: Vec<u32>,
+    pub(super) points: Vec<u32>,
     waiting: BTreeMap<BatchKey, Arrival>,
     pub(super) snapshots: BTreeMap<Lane, u32>,
 }
@@ -264,6 +265,9 @@ impl Farm {
         let schedule = Arc::clone(&live.schedule);
         let mut merge =
             Merge::new(schedule, live.spec.settings.planes(), kept, ledger.commits, ledger.checkpoints);
+        if live.mandate().is_some() {
+            merge.look_again();
+        }
         live.set_brought(ledger.brought);
         live.arrivals().into_iter().for_each(|arrival| merge.add(arrival));
         publish(live, &merge);
@@ -371,6 +375,7 @@ impl Farm {
             bytes += source.bytes();
             sums.push((row, source));
         }
+        FailPoint::AppendRead.pass();
         let appended = sums.len() as u64;
         let (held, lost) = blocking(move || -> Result<(Held, Vec<BatchKey>)> {
             let merge = held.as_mut().expect("loaded by the caller");
@@ -393,6 +398,7 @@ impl Farm {
             self.may_mend(live)?;
             self.again(live, lost, Vec::new()).await?;
         }
+        FailPoint::AppendAdded.pass();
         self.counters.appended(appended, bytes);
         publish(live, held.as_ref().expect("loaded by the caller"));
         Ok(held)
@@ -418,8 +424,11 @@ impl Farm {
             })
             .await?;
             held = back;
+            FailPoint::PrefixBeforeBlob.pass();
             self.blobs.put(&BlobName::Prefix(live.id.clone(), lane, blocks), bytes.into()).await?;
+            FailPoint::PrefixAfterBlob.pass();
             self.store.set_snapshot(&live.id, Self::mandate(live)?, lane, blocks).await?;
+            FailPoint::PrefixAfterRow.pass();
             held.as_mut().expect("loaded by the caller").snapshots.insert(lane, blocks);
             self.forget_partials(live, lane, since, blocks).await?;
         }
@@ -432,6 +441,7 @@ impl Farm {
         }
         for row in self.store.commits(&live.id, lane, since..blocks).await? {
             self.blobs.delete(&BlobName::Partial(live.id.clone(), row.batch, row.hash)).await?;
+            FailPoint::PartialsBetween.pass();
         }
         Ok(())
     }

@@ -8,7 +8,7 @@ use crate::store::row::{BatchKey, LeaseRow};
 use ovtigre_core::settings::Settings;
 use ovtigre_proto::{
     id::{BlobId, JobId, LeaseId, WorkerId},
-    lease::WorkerJoin,
+    lease::{Exchange, WorkerJoin},
 };
 use std::{
     cmp::Reverse,
@@ -83,6 +83,8 @@ pub struct Holding {
     pub row: LeaseRow,
     /// When its time was last extended.
     pub renewed: Instant,
+    /// Number of the worker's exchange in whose answer it was handed out; 0 where that is not known.
+    pub beat: u64,
     /// What a sum is held against that is only for comparison; `None` where it is to count.
     pub audit: Option<Audit>,
 }
@@ -117,6 +119,8 @@ pub struct Asker<'a> {
     pub wants: u32,
     /// Active workers, itself included.
     pub active: usize,
+    /// Number of its exchange.
+    pub beat: u64,
 }
 
 /// Jobs whose batches are handed out, and the leases.
@@ -239,9 +243,24 @@ impl Book {
         }
     }
 
-    /// A batch was handed out.
-    pub fn hold(&mut self, row: LeaseRow, audit: Option<Audit>) {
-        self.leases.insert(row.id.clone(), Holding { row, renewed: Instant::now(), audit });
+    /// A batch was handed out, in the answer to the worker's exchange number `beat`.
+    pub fn hold(&mut self, row: LeaseRow, audit: Option<Audit>, beat: u64) {
+        self.leases.insert(row.id.clone(), Holding { row, renewed: Instant::now(), beat, audit });
+    }
+
+    /// Leases that a worker was given before this exchange of its, and does not hold.
+    pub fn unheard(&self, worker: &WorkerId, said: &Exchange) -> Vec<LeaseId> {
+        let unheard = |held: &&Holding| {
+            held.row.worker == *worker
+                && held.beat < said.beat
+                && said.holding.iter().all(|progress| progress.lease != held.row.id)
+        };
+        self.leases.values().filter(unheard).map(|held| held.row.id.clone()).collect()
+    }
+
+    /// A lease is nobody's any more.
+    pub fn forget(&mut self, id: &LeaseId) {
+        self.leases.remove(id);
     }
 
     /// A lease.
@@ -288,11 +307,6 @@ impl Book {
     /// Batches that could be handed out now before the next checkpoints.
     pub fn waiting(&self) -> u64 {
         self.jobs.values().filter(|e| e.hand_out == HandOut::Yes).map(|e| e.plan.waiting()).sum()
-    }
-
-    /// Batches in workers' hands.
-    pub fn leased(&self) -> u64 {
-        self.leases.len() as u64
     }
 }
 

@@ -7,7 +7,7 @@ use super::{
     error::Result,
     live::{Ending, Live, Waits},
 };
-use crate::store::row::NewCheckpoint;
+use crate::{fail_point::FailPoint, store::row::NewCheckpoint};
 use ovtigre_core::{
     film::{
         certificate::Look,
@@ -83,6 +83,7 @@ impl Farm {
         rows.push(row.clone());
         row.target_expected_at_seconds = target_at(&rows, &live.spec);
         let mandate = Self::mandate(live)?;
+        FailPoint::CheckpointBeforeRow.pass();
         merge.checkpoints += 1;
         let checkpoint =
             NewCheckpoint { look: merge.checkpoints, row: row.clone(), layers: layers.clone(), progress };
@@ -90,11 +91,26 @@ impl Farm {
             merge.checkpoints -= 1;
             return Err(error.into());
         }
+        FailPoint::CheckpointAfterRow.pass();
         live.set_view(|view| {
-            view.curve.push(row.clone());
+            if view.curve.len() < merge.checkpoints as usize {
+                view.curve.push(row.clone());
+            }
             view.layers = layers;
         });
         Ok(row)
+    }
+}
+
+impl Merge {
+    /// The latest checkpoint is looked at once more where no lane is past it: whoever looked before may have
+    /// died when the job was about to end there.
+    pub(super) fn look_again(&mut self) {
+        let Some(latest) = self.checkpoints.checked_sub(1) else { return };
+        let Some(limit) = self.points.get(latest as usize) else { return };
+        if self.prefixes.iter().flatten().all(|prefix| prefix.blocks() <= *limit) {
+            self.checkpoints = latest;
+        }
     }
 }
 

@@ -12,6 +12,7 @@ use super::{
 };
 use crate::{
     blobs::{BlobError, BlobName},
+    fail_point::FailPoint,
     store::row::{BatchKey, CommitOutcome, CommitRow, NewCommit},
 };
 use bytes::Bytes;
@@ -64,6 +65,7 @@ impl Farm {
             Err(FarmError::TooLarge { limit })
         } else {
             let partial = self.blobs.get(&name).await?;
+            FailPoint::SumHanded.pass();
             self.take_sum(lease, partial, time, Way::Handed).await
         };
         self.blobs.delete(&name).await?;
@@ -101,6 +103,7 @@ impl Farm {
             Way::Here => self.blobs.put_once(&name, partial).await?,
             Way::Handed => self.blobs.rename(&BlobName::Handed(lease.clone()), &name).await?,
         }
+        FailPoint::SumAfterBlob.pass();
         let worker = self.book().lease(lease).map(|held| held.row.worker.clone());
         let micros = time.min(TIME_MAX).as_micros() as u64;
         let row = CommitRow { batch: key, hash, worker_micros: micros };
@@ -112,6 +115,7 @@ impl Farm {
         };
         match self.store.commit(new).await? {
             CommitOutcome::First => {
+                FailPoint::SumAfterRow.pass();
                 self.counters.count(Fate::Accepted);
                 let failed = self.book().brought(&job, key);
                 if let Some(worker) = &worker {
@@ -172,7 +176,7 @@ impl Farm {
         let (job, scene) = (live.id.clone(), live.scene.clone());
         let method = live.spec.settings.method.name();
         let planes = live.spec.settings.planes() as usize;
-        blocking(move || {
+        let decoded = blocking(move || {
             let read = exr::read_partial(&partial, batch.region.pixels());
             let (sum, says) = read.map_err(|e| FarmError::Sum(e.to_string()))?;
             if sum.batch != batch {
@@ -193,7 +197,9 @@ impl Farm {
             let hash = BlobId::of(sum.hash());
             Ok(Decoded { sum, hash, solution: says.solution })
         })
-        .await?
+        .await?;
+        FailPoint::SumBeforeBlob.pass();
+        decoded
     }
 
     /// The sum waits in memory where there is room, else as a blob.
@@ -201,6 +207,7 @@ impl Farm {
         let waiting: u64 = self.lives().iter().map(|live| live.fresh_bytes()).sum();
         let fits = waiting + super::live::sum_bytes(&sum) <= self.rules.fresh_bytes;
         live.arrive(Arrival { row, sum: fits.then_some(sum) });
+        FailPoint::SumBeforeReply.pass();
     }
 
     fn disagree(&self, job: &JobId, batch: BatchKey, got: &BlobId, kept: &BlobId, worker: Option<&WorkerId>) {

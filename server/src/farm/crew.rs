@@ -98,6 +98,12 @@ impl Crew {
         self.members.get(id).is_some_and(|member| member.rests_until > Instant::now())
     }
 
+    /// Workers that were not heard of for `time`.
+    pub fn silent(&self, time: Duration) -> Vec<WorkerId> {
+        let silent = self.members.iter().filter(|(_, member)| member.seen.elapsed() > time);
+        silent.map(|(id, _)| id.clone()).collect()
+    }
+
     /// Workers lost or gone.
     pub fn remove(&mut self, id: &WorkerId) {
         self.members.remove(id);

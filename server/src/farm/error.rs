@@ -4,6 +4,7 @@ use crate::{
     blobs::BlobError,
     store::{error::StoreError, row::JobRow},
 };
+use ovtigre_core::film::size::Region;
 use ovtigre_proto::{
     id::{BlobId, JobId},
     problem::Fault,
@@ -76,6 +77,16 @@ pub enum FarmError {
     /// A layer that the picture has not.
     #[error("the picture has no layer '{0}'")]
     NoLayer(String),
+    /// A pixel that is not rendered.
+    #[error("there is no pixel {x},{y}: {region} is rendered (x,y,width,height)")]
+    NoPixel {
+        /// Its column.
+        x: u32,
+        /// Its row.
+        y: u32,
+        /// What is rendered.
+        region: Region,
+    },
     /// The store failed.
     #[error(transparent)]
     Store(#[from] StoreError),

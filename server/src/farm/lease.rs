@@ -10,6 +10,7 @@ use super::{
 };
 use crate::{
     blobs::BlobName,
+    fail_point::FailPoint,
     store::row::{Claim, LeaseRow, Released},
 };
 use ovtigre_proto::{
@@ -33,6 +34,7 @@ impl Farm {
     pub async fn exchange(&self, worker: &WorkerId, said: Exchange) -> Result<ExchangeReply> {
         let (state, join) = self.hear(worker, &said).await?;
         let drop = self.renew(worker, &said).await?;
+        self.take_unheard(worker, &said).await?;
         let more = self.book().more();
         let mut more = pin!(more.notified());
         more.as_mut().enable();
@@ -131,13 +133,28 @@ impl Farm {
                     None if renewed.contains(&id)
                         && let Some((job, batch)) = batch_of(&id) =>
                     {
-                        book.hold(LeaseRow { id, job, batch, worker: worker.clone() }, None);
+                        book.hold(LeaseRow { id, job, batch, worker: worker.clone() }, None, said.beat);
                     }
                     _ => lost.push(id),
                 }
             }
         }
         Ok(lost)
+    }
+
+    /// Batches of whose leases the worker never heard, because an answer was lost, go to others at once.
+    async fn take_unheard(&self, worker: &WorkerId, said: &Exchange) -> Result<()> {
+        let unheard = self.book().unheard(worker, said);
+        for lease in unheard {
+            tracing::debug!(%lease, %worker, "its worker has not got it");
+            let reason = "its worker has not got it".to_owned();
+            match self.give_back(&lease, LeaseFailure { reason, kind: FailureKind::HandedBack }).await {
+                Ok(()) => self.counters.count(Fate::Expired),
+                Err(FarmError::NotFound { .. }) => self.book().forget(&lease),
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(())
     }
 
     async fn hand_out(&self, worker: &WorkerId, join: &WorkerJoin, said: &Exchange) -> Result<Vec<Lease>> {
@@ -147,7 +164,8 @@ impl Farm {
         // Another server may have been faster: what is left is known after the first try.
         for _ in 0..3 {
             let left = wants - leases.len() as u32;
-            let asker = Asker { id: worker, join, scenes: &said.scenes, wants: left, active };
+            let asker =
+                Asker { id: worker, join, scenes: &said.scenes, wants: left, active, beat: said.beat };
             let (handed_out, refused) = self.claim_offers(&asker).await?;
             leases.extend(handed_out);
             if refused.is_empty() || !self.is_shared() {
@@ -193,7 +211,7 @@ impl Farm {
             let Offer { job, batch: key, scene, settings, audit, .. } = offer;
             let upload = if audit.is_some() { None } else { self.upload_to(&id).await };
             let row = LeaseRow { id: id.clone(), job: job.clone(), batch: key, worker: worker.clone() };
-            self.book().hold(row, audit);
+            self.book().hold(row, audit, asker.beat);
             let seconds = self.rules.lease.as_secs_f64();
             leases.push(Lease {
                 id,
@@ -248,9 +266,11 @@ impl Farm {
         }
         let (places, claims): (Vec<usize>, Vec<Claim>) = claims.into_iter().unzip();
         if !claims.is_empty() {
+            FailPoint::ClaimBeforeRow.pass();
             for (place, yes) in places.into_iter().zip(self.store.claim(claims, self.rules.lease).await?) {
                 claimed[place] = yes;
             }
+            FailPoint::ClaimAfterRow.pass();
         }
         Ok(claimed)
     }

@@ -8,6 +8,7 @@ use super::{
 };
 use crate::{
     blobs::BlobFolder,
+    fail_point::FailPoint,
     store::{error::StoreError, row::Mandate},
 };
 use std::{collections::BTreeMap, sync::Arc};
@@ -26,6 +27,7 @@ impl Farm {
             live.set_elsewhere(true);
             return Ok(false);
         };
+        FailPoint::MandateAfterRow.pass();
         // What is in memory was read beside somebody else's work.
         *live.merge.lock().await = None;
         live.set_mandate(Some(mandate));

@@ -18,8 +18,10 @@ pub mod live;
 pub mod mandates;
 pub mod open;
 pub mod others;
+pub mod parts;
 pub mod paths;
 pub mod picture;
+pub mod pixel;
 pub mod reach;
 pub mod reap;
 pub mod rules;
@@ -72,6 +74,7 @@ pub struct Farm {
     inspect: Inspect,
     ids: Ids,
     fullness: space::Fullness,
+    shown: picture::Shown,
     tasks: TaskTracker,
     decoders: tokio::sync::Semaphore,
     inspectors: tokio::sync::Semaphore,

@@ -48,6 +48,7 @@ impl Farm {
             stopping: tokio_util::sync::CancellationToken::new(),
             inspect,
             fullness: super::space::Fullness::default(),
+            shown: super::picture::Shown::default(),
             ids,
             tasks: tokio_util::task::TaskTracker::new(),
             decoders: Semaphore::new(processors),
@@ -92,6 +93,7 @@ impl Farm {
         } else {
             self.blobs.delete_all(&BlobFolder::Incoming).await?;
         }
+        self.blobs.delete_older(&BlobFolder::AllParts, UPLOAD_MAX).await?;
         for id in self.blobs.jobs().await? {
             match self.store.job(&id).await? {
                 None => self.blobs.delete_all(&BlobFolder::Job(id)).await?,
@@ -135,7 +137,7 @@ impl Farm {
         let entry = book::Entry::new(row.scene.clone(), settings, plan, order, hand_out, wants);
         let mut book = self.book();
         book.add(row.id.clone(), entry);
-        ledger.leases.into_iter().for_each(|lease| book.hold(lease, None));
+        ledger.leases.into_iter().for_each(|lease| book.hold(lease, None, 0));
         Ok(())
     }
 }

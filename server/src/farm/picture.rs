@@ -4,7 +4,7 @@ use super::{
     Farm,
     append::blocking,
     error::{FarmError, Result},
-    live::{Live, Made},
+    live::{Live, Made, held},
     open::read_spec,
 };
 use crate::{
@@ -22,10 +22,22 @@ use ovtigre_core::film::{
 };
 use ovtigre_core::{path::expression::presets::shown, settings::Settings};
 use ovtigre_proto::id::JobId;
-use std::{fmt, ops::Range, time::Duration};
+use std::{
+    fmt,
+    ops::Range,
+    sync::{Arc, Mutex},
+    time::Duration,
+};
 
 /// What a picture's files say made them.
 const SOFTWARE: &str = concat!("ovtigre ", env!("CARGO_PKG_VERSION"));
+
+/// Values of a picture that is remembered, at most: 256 MiB of them.
+const SHOWN_MAX: usize = 1 << 26;
+
+/// The channels of the picture of a job that is over that were read last, by its set of batches.
+#[derive(Debug, Default)]
+pub(super) struct Shown(Mutex<Option<(String, Arc<Layers>)>>);
 
 /// A picture's EXR, in memory or kept.
 #[derive(Debug)]
@@ -164,6 +176,20 @@ impl Farm {
         }
     }
 
+    /// The channels of a job that is over; those shown last are remembered, as they are looked at in many ways.
+    pub(super) async fn kept_layers(&self, id: &JobId, manifest: &str) -> Result<Arc<Layers>> {
+        if let Some((_, layers)) = held(&self.shown.0).as_ref().filter(|(of, _)| of == manifest) {
+            return Ok(Arc::clone(layers));
+        }
+        let exr = self.blobs.get(&self.kept(id, manifest).await?.0).await?;
+        let layers = blocking(move || read_layers(&exr)).await?;
+        let layers = Arc::new(layers.map_err(|e| FarmError::Damaged(e.to_string()))?);
+        if layers.channels.values().map(Vec::len).sum::<usize>() <= SHOWN_MAX {
+            *held(&self.shown.0) = Some((manifest.to_owned(), Arc::clone(&layers)));
+        }
+        Ok(layers)
+    }
+
     /// Some bytes of a picture's file.
     pub async fn exr_range(&self, file: &ExrFile, range: Range<u64>) -> Result<Bytes> {
         match file {
@@ -210,10 +236,10 @@ impl Farm {
         let (plane, part) = plane.ok_or_else(|| FarmError::NoLayer(layer.to_string()))?;
         let region = spec.region;
         if let (true, Some(manifest)) = (row.settled, &row.manifest) {
-            let exr = self.blobs.get(&self.kept(id, manifest).await?.0).await?;
+            let layers = self.kept_layers(id, manifest).await?;
             let name = plane.checked_sub(1).map(|i| spec.settings.layers[i].name.as_str());
             let prefix = prefix_of(name, part);
-            let png = blocking(move || develop_kept(&exr, region, &prefix, &develop)).await??;
+            let png = blocking(move || develop_kept(&layers, region, &prefix, &develop)).await??;
             return Ok((manifest.clone(), png));
         }
         let live = self.live(id).filter(|_| !row.settled).ok_or_else(|| FarmError::no_picture(&row))?;
@@ -232,11 +258,13 @@ impl Farm {
     }
 }
 
-fn develop_kept(exr: &[u8], region: Region, prefix: &str, develop: &Develop) -> Result<Bytes> {
-    let layers = read_layers(exr).map_err(|e| FarmError::Damaged(e.to_string()))?;
-    let plane = plane(&layers, region, prefix).ok_or_else(|| {
-        FarmError::Damaged("the kept picture has other channels or another size".to_owned())
-    })?;
+/// A picture that has other channels or another size than its job.
+pub(super) fn misfit() -> FarmError {
+    FarmError::Damaged("the kept picture has other channels or another size".to_owned())
+}
+
+fn develop_kept(layers: &Layers, region: Region, prefix: &str, develop: &Develop) -> Result<Bytes> {
+    let plane = plane(layers, region, prefix).ok_or_else(misfit)?;
     Ok(png(region, &plane, develop).into())
 }
 

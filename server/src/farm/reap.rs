@@ -9,7 +9,10 @@ use super::{
 };
 use crate::{blobs::BlobFolder, store::error::StoreError};
 use ovtigre_proto::{lease::FailureKind, status::JobState};
-use std::{sync::Arc, time::Duration};
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 /// How long a job rests after its store or its files failed.
 const REST: Duration = Duration::from_secs(1);
@@ -47,17 +50,40 @@ impl Farm {
         Ok(())
     }
 
+    /// Leases of workers that missed two beats end now: `reap` takes them back.
+    pub(super) async fn end_missed(&self) -> Result<()> {
+        if self.is_shared() {
+            // It may beat at another server.
+            return Ok(());
+        }
+        let time = Duration::from_secs_f64(2.0 * self.interval()).max(self.rules.missed);
+        let silent = self.crew().silent(time);
+        for worker in silent {
+            let leases = self.book().held_by(&worker);
+            if !leases.is_empty() {
+                tracing::info!(%worker, leases = leases.len(), "worker missed two beats");
+                self.store.renew(&worker, leases, Duration::ZERO).await?;
+            }
+        }
+        Ok(())
+    }
+
     pub(super) async fn tick(self: Arc<Self>) {
         let mut beat = tokio::time::interval(self.rules.tick);
         beat.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
         let mut keep = tokio::time::interval(self.rules.keep_mandate);
         keep.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
         let mut hour = tokio::time::interval(Duration::from_hours(1));
+        let mut latest = Instant::now();
         loop {
             let done = tokio::select! {
                 () = self.stopping.cancelled() => return,
                 _ = keep.tick() => self.keep_and_tell().await,
-                _ = beat.tick() => self.reap_and_follow().await,
+                _ = beat.tick() => {
+                    // Where the server itself was held up, nobody could be heard.
+                    let awake = std::mem::replace(&mut latest, Instant::now()).elapsed() < self.rules.missed / 2;
+                    self.reap_and_follow(awake).await
+                }
                 _ = hour.tick() => self.forget_old().await,
             };
             if let Err(error) = done {
@@ -69,11 +95,15 @@ impl Farm {
     /// Forgets idempotency keys, and uploads that were cut off.
     async fn forget_old(&self) -> Result<()> {
         self.store.forget_keys(self.rules.keys).await?;
+        self.blobs.delete_older(&BlobFolder::AllParts, UPLOAD_MAX).await?;
         Ok(self.blobs.delete_older(&BlobFolder::Incoming, UPLOAD_MAX).await?)
     }
 
-    async fn reap_and_follow(self: &Arc<Self>) -> Result<()> {
+    async fn reap_and_follow(self: &Arc<Self>, awake: bool) -> Result<()> {
         self.follow_others().await?;
+        if awake {
+            self.end_missed().await?;
+        }
         self.reap().await
     }
 

@@ -11,6 +11,9 @@ pub const PARTIAL_BYTES_MAX: usize = 256 << 20;
 pub struct Rules {
     /// A lease ends so long after it was given or renewed.
     pub lease: Duration,
+    /// A worker that was not heard of for two intervals, and at least for so long, loses what it holds before its leases
+    /// end, where this server is the only one.
+    pub missed: Duration,
     /// A worker that was not heard of for so long is lost.
     pub silence: Duration,
     /// A worker's beat is written down at most so often.
@@ -68,6 +71,7 @@ impl Default for Rules {
     fn default() -> Self {
         Self {
             lease: Duration::from_secs(10),
+            missed: Duration::from_secs(2),
             silence: Duration::from_secs(15),
             note_beat: Duration::from_secs(3),
             beat: Duration::from_millis(200),

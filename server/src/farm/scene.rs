@@ -5,7 +5,10 @@ use super::{
     append::blocking,
     error::{FarmError, Result, fault},
 };
-use crate::blobs::{BlobError, BlobName, Upload};
+use crate::{
+    blobs::{BlobError, BlobName, Upload},
+    fail_point::FailPoint,
+};
 use bytes::Bytes;
 use futures::stream::BoxStream;
 use ovtigre_proto::{
@@ -99,7 +102,9 @@ impl Farm {
             return Err(FarmError::Scene(vec![fault("", "the file is empty")]));
         }
         let (name, bytes) = (BlobName::Scene(id.clone()), incoming.bytes);
+        FailPoint::SceneBeforeBlob.pass();
         incoming.upload.finish(&name).await?;
+        FailPoint::SceneAfterBlob.pass();
         let content = match self.look_into(&name).await {
             Ok(content) => content,
             Err(error) => {
@@ -109,6 +114,7 @@ impl Farm {
         };
         let report = SceneReport { id, bytes, content };
         self.store.add_scene(report.clone()).await?;
+        FailPoint::SceneAfterRow.pass();
         Ok((report, Novelty::New))
     }
 

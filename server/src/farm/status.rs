@@ -27,15 +27,10 @@ impl Farm {
         self.status_of(&row).await
     }
 
-    /// Jobs, the newest first; `before` is where the last page ended.
-    pub async fn jobs(
-        &self,
-        state: Option<JobState>,
-        before: Option<i64>,
-        limit: u32,
-    ) -> Result<Page<JobStatus>> {
-        let limit = limit.clamp(1, PAGE_MAX);
-        let mut rows = self.store.jobs(JobFilter { state, before, limit: limit + 1 }).await?;
+    /// Jobs, the newest first.
+    pub async fn jobs(&self, filter: JobFilter) -> Result<Page<JobStatus>> {
+        let limit = filter.limit.clamp(1, PAGE_MAX);
+        let mut rows = self.store.jobs(JobFilter { limit: limit + 1, ..filter }).await?;
         let more = rows.len() > limit as usize;
         rows.truncate(limit as usize);
         let next = rows.last().filter(|_| more).map(|row| row.sequence.to_string());
@@ -146,12 +141,19 @@ impl Farm {
     }
 
     /// How many workers the queue could use now.
-    pub fn scaling(&self) -> Scaling {
-        let book = self.book();
-        let (batches_waiting, leased) = (book.waiting(), book.leased());
-        drop(book);
-        let desired_workers = u32::try_from(batches_waiting + leased).unwrap_or(u32::MAX);
-        Scaling { desired_workers, active_workers: self.crew().active(self.rules.silence), batches_waiting }
+    pub async fn scaling(&self) -> Result<Scaling> {
+        // What other servers handed out is not in this one's book.
+        if self.is_shared() {
+            for live in self.lives() {
+                self.refresh_plan(&live.id).await?;
+            }
+        }
+        let batches_waiting = self.book().waiting();
+        let counts = self.store.counts().await?;
+        let desired_workers = u32::try_from(batches_waiting + counts.leases).unwrap_or(u32::MAX);
+        let active = counts.workers.iter().find(|(state, _)| *state == WorkerState::Active);
+        let active_workers = active.map_or(0, |(_, workers)| u32::try_from(*workers).unwrap_or(u32::MAX));
+        Ok(Scaling { desired_workers, active_workers, batches_waiting })
     }
 }
 

@@ -8,6 +8,7 @@ use super::{
 };
 use crate::{
     blobs::{BlobFolder, BlobName},
+    fail_point::FailPoint,
     store::row::{JobChange, JobRow, Settlement},
 };
 use ovtigre_proto::{id::JobId, status::JobState};
@@ -27,14 +28,17 @@ impl Farm {
         let merge = held.as_ref().expect("loaded by the caller");
         let (progress, manifest) = (merge.progress(), merge.manifest(&live.identity));
         drop(held);
+        FailPoint::EndBeforeResult.pass();
         if manifest.is_some() {
             let Made { manifest, bytes } = self.make_exr(live).await?;
             self.blobs.put(&BlobName::Result(live.id.clone(), manifest), bytes).await?;
         }
+        FailPoint::EndAfterResult.pass();
         match ending.state {
             JobState::Done => self.keep_sums(live).await?,
             _ => self.drop_sums(live).await?,
         }
+        FailPoint::EndAfterSums.pass();
         let settlement = Settlement { mandate, progress, manifest, certified: ending.certified };
         let change = |row: &JobRow| {
             let over = row.state.is_over();
@@ -53,6 +57,7 @@ impl Farm {
             }
             done => done.map(drop)?,
         }
+        FailPoint::EndAfterRow.pass();
         self.forget_live(&live.id);
         live.changed();
         tracing::info!(job = %live.id, state = ending.state.name(), reason = ending.reason, "job is over");
@@ -83,6 +88,7 @@ impl Farm {
     /// Removes partials of a job that is over, and its sums unless they are kept.
     pub(super) async fn remove_leftovers(&self, id: &JobId) -> Result<()> {
         self.blobs.delete_all(&BlobFolder::Partials(id.clone())).await?;
+        FailPoint::EndBetweenLeftovers.pass();
         if self.store.ledger(id).await?.snapshots.is_empty() {
             self.blobs.delete_all(&BlobFolder::Prefixes(id.clone())).await?;
         }

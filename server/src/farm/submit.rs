@@ -8,7 +8,10 @@ use super::{
     rules::{PARTIAL_BYTES_MAX, Rules},
     spec::JobSpec,
 };
-use crate::store::row::{Added, IdempotencyKey, NewJob};
+use crate::{
+    fail_point::FailPoint,
+    store::row::{Added, IdempotencyKey, NewJob},
+};
 use ovtigre_core::{
     film::size::{Region, Size},
     render::inspect::by_chance,
@@ -106,6 +109,12 @@ impl Farm {
             key: format!("{}/{key}", owner.as_deref().unwrap_or_default()),
             fingerprint: blake3::hash(&asked).to_hex().to_string(),
         });
+        // A job that was taken before is told of, also where no further one would be taken.
+        if let Some(key) = &key
+            && let Some(before) = self.store.keyed(key).await?
+        {
+            return self.taken_before(before).await;
+        }
         self.need_room()?;
         let mut spec = self.check(request).await?;
         self.has_room_for(owner.as_deref())?;
@@ -121,15 +130,23 @@ impl Farm {
             regions: spec.schedule().regions().len() as u32,
             replicates: spec.settings.replicates,
         };
+        FailPoint::JobBeforeRow.pass();
         match self.store.add_job(new, key).await? {
             Added::New => {
+                FailPoint::JobAfterRow.pass();
                 let row = self.job_row(&id).await?;
                 tracing::info!(job = %id, name = row.name, "job taken");
                 self.take_up(&row).await?;
                 self.status_of(&row).await
             }
+            before => self.taken_before(before).await,
+        }
+    }
+
+    async fn taken_before(&self, before: Added) -> Result<JobStatus> {
+        match before {
+            Added::New | Added::KeyTaken => Err(FarmError::KeyTaken),
             Added::Before(id) => self.status(&id).await,
-            Added::KeyTaken => Err(FarmError::KeyTaken),
         }
     }
 }

@@ -105,7 +105,7 @@ async fn jobs_are_listed_page_by_page(store: &dyn Store) {
         with_job(store, name).await;
     }
     let list = async |state, before, limit| {
-        let rows = store.jobs(JobFilter { state, before, limit }).await.unwrap();
+        let rows = store.jobs(JobFilter { state, text: None, before, limit }).await.unwrap();
         rows.into_iter().map(|row| (row.id.to_string(), row.sequence)).collect::<Vec<_>>()
     };
     let page = list(None, None, 3).await;
@@ -116,6 +116,12 @@ async fn jobs_are_listed_page_by_page(store: &dyn Store) {
     assert!(store.change_job(&id("c"), 1, change).await.unwrap());
     assert_eq!(list(Some(JobState::Paused), None, 9).await.len(), 1);
     assert_eq!(list(Some(JobState::Queued), None, 9).await.len(), 3);
+    for (text, found) in [("C", 1), ("", 4), ("%", 0), ("_", 0), ("'", 0), ("\\", 0)] {
+        for (state, least) in [(None, found), (Some(JobState::Paused), found.min(1))] {
+            let filter = JobFilter { state, text: Some(text.to_owned()), before: None, limit: 9 };
+            assert_eq!(store.jobs(filter).await.unwrap().len(), least, "{text} {state:?}");
+        }
+    }
     let open: Vec<_> =
         store.unsettled_jobs().await.unwrap().into_iter().map(|row| row.id.to_string()).collect();
     assert_eq!(open, ["a", "b", "c", "d"], "the oldest first");

@@ -49,6 +49,8 @@ pub trait Store: Send + Sync + fmt::Debug {
 
     /// Adds a job with a cursor at block 0 of each lane, unless `key` was used before.
     async fn add_job(&self, job: NewJob, key: Option<IdempotencyKey>) -> Result<Added>;
+    /// What became of an earlier job under that key, where there was one.
+    async fn keyed(&self, key: &IdempotencyKey) -> Result<Option<Added>>;
     /// A job.
     async fn job(&self, id: &JobId) -> Result<Option<JobRow>>;
     /// Jobs, the newest first.

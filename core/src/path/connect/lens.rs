@@ -13,7 +13,7 @@ use crate::path::rules::{Rules, Weighing};
 use crate::path::tally::{Receiver, Tally};
 use crate::path::throughput::Throughput;
 use crate::path::vertex::{Vertex, Weight};
-use crate::path::walk::Walk;
+use crate::path::walk::{Sight, Walk};
 use crate::sampler::Use;
 use crate::scene::importance::{Importance, LensHit, Seen};
 use glam::Vec3;
@@ -37,7 +37,7 @@ pub fn to_lens<E: Throughput<EyeState>, L: Throughput<LightState>>(
     if light.is_dead() || light.total() == Vec3::ZERO {
         return;
     }
-    let passes = unblocked::between(scene, vertex, &walk.media, seen.end, tally);
+    let passes = unblocked::seen(scene, vertex, &walk.media, seen.end, tally);
     if passes == Vec3::ZERO {
         return;
     }
@@ -155,7 +155,8 @@ pub fn light_to_lens<E: Throughput<EyeState>, L: Throughput<LightState>>(
     tally.deposit(rules, receiver, technique, &eye, &light, Rgb::splat(factor as f32));
 }
 
-/// Adds light that meets the lens on its way to `end`.
+/// Adds light that meets the lens by itself. The image of a light without extent, straight or by ideally specular
+/// surfaces, is left out: no other technique makes it, so it is seen by none.
 pub fn hit_lens<E: Throughput<EyeState>, L: Throughput<LightState>>(
     walk: &Walk<'_, LightState, L>,
     t_max: f32,
@@ -165,7 +166,8 @@ pub fn hit_lens<E: Throughput<EyeState>, L: Throughput<LightState>>(
     let technique = (walk.scatterings as usize + 2, 0);
     let rules = walk.rules;
     let Weighing::Chosen(chosen) = &rules.weighing else { return };
-    if !chosen.uses(technique.0, technique.1) {
+    let is_image = !start.is_hit && walk.sight != Sight::Scattered;
+    if is_image || !chosen.uses(technique.0, technique.1) {
         return;
     }
     let Some(hit) = walk.view().meet(&walk.edge.ray, t_max) else { return };

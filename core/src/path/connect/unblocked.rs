@@ -21,6 +21,19 @@ pub fn between(scene: &Scene, vertex: &Vertex<'_>, media: &Media, end: Vec3, tal
     faded(vertex, media, towards, (end - origin).length()) * passes
 }
 
+/// The same to a place on the lens, along the ray by which the eye sees the vertex: where that place lies on a surface, both
+/// ways are not alike, but path and light are to agree.
+pub fn seen(scene: &Scene, vertex: &Vertex<'_>, media: &Media, eye: Vec3, tally: &mut Tally) -> Rgb {
+    let towards = eye - vertex.at.position;
+    let end = vertex.leave(towards);
+    let ray = Ray { origin: eye, direction: end - eye, t_max: 1.0, moment: vertex.at.moment };
+    let passes = along(scene, &ray, tally);
+    if passes == 0.0 {
+        return Vec3::ZERO;
+    }
+    faded(vertex, media, towards, (end - eye).length()) * passes
+}
+
 /// Share of light that passes from a vertex to infinity.
 pub fn to_infinity(
     scene: &Scene,

@@ -3,7 +3,7 @@
 use super::bench::{Bench, Spread, rules};
 use crate::farm::{error::FarmError, rules::Rules};
 use ovtigre_proto::{
-    lease::{Commit, Exchange, FailureKind, LeaseFailure},
+    lease::{Commit, Exchange, FailureKind, Lease, LeaseFailure, LeaseProgress},
     status::{JobState, WorkerState},
 };
 use std::time::Duration;
@@ -14,6 +14,42 @@ fn short() -> Rules {
 
 async fn sleep(millis: u64) {
     tokio::time::sleep(Duration::from_millis(millis)).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_lease_whose_answer_was_lost_is_given_out_again_at_the_next_beat() {
+    let bench = Bench::new(rules()).await;
+    bench.job(1000, |_| ()).await;
+    let (worker, other) = (bench.worker().await, bench.worker().await);
+    let beat = |beat, wants, holding: &[&Lease]| {
+        let progress = |lease: &&Lease| LeaseProgress { lease: lease.id.clone(), done: 0.0 };
+        let holding = holding.iter().map(progress).collect();
+        bench.farm.exchange(&worker, Exchange { wants, holding, beat, ..Exchange::default() })
+    };
+    let lost = beat(1, 2, &[]).await.unwrap().leases;
+    // The same exchange once more, as a line that repeats itself does: it says nothing of what was handed out since.
+    let kept = beat(1, 1, &[]).await.unwrap().leases;
+    assert!(!lost.contains(&kept[0]));
+    beat(2, 0, &[&kept[0]]).await.unwrap();
+    let again = bench.take(&other, 3).await;
+    assert_eq!((again[0].batch, again[1].batch), (lost[0].batch, lost[1].batch));
+    assert!(again.iter().all(|lease| lease.batch != kept[0].batch), "what is held stays");
+    assert_eq!(bench.bring(&kept[0], Spread::Noisy).await, Commit::Accepted);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_worker_that_misses_two_beats_loses_what_it_holds_long_before_its_leases_end() {
+    let bench = Bench::new(Rules { missed: Duration::from_millis(100), ..rules() }).await;
+    bench.job(1000, |_| ()).await;
+    let (dead, other) = (bench.worker().await, bench.worker().await);
+    let lost = bench.take(&dead, 2).await;
+    let kept = bench.take(&other, 1).await;
+    for _ in 0..10 {
+        sleep(30).await;
+        assert!(bench.beat(&other, &kept[0]).await, "who beats keeps what it holds");
+    }
+    let again = bench.take(&other, 2).await;
+    assert_eq!((again[0].batch, again[1].batch), (lost[0].batch, lost[1].batch));
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -56,7 +92,7 @@ async fn a_silent_worker_is_lost_and_comes_back_by_speaking() {
     let worker = bench.worker().await;
     sleep(400).await;
     assert_eq!(bench.farm.worker(&worker).await.unwrap().state, WorkerState::Lost);
-    assert_eq!(bench.farm.scaling().active_workers, 0);
+    assert_eq!(bench.farm.scaling().await.unwrap().active_workers, 0);
     bench.take(&worker, 1).await;
     assert_eq!(bench.farm.worker(&worker).await.unwrap().state, WorkerState::Active);
 }

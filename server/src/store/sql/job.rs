@@ -35,15 +35,22 @@ pub(super) async fn scene(db: &mut Db, id: &BlobId) -> Result<Option<SceneRow>> 
     Ok(Some(SceneRow { report: from_json(&row, "report")?, created_at: time(row.whole("created_ms")?)? }))
 }
 
+/// What became of an earlier job under that key.
+pub(super) async fn keyed(db: &mut Db, key: &IdempotencyKey) -> Result<Option<Added>> {
+    let before = query("SELECT fingerprint, job FROM idempotency WHERE key = $1").bind(&*key.key);
+    let Some(row) = db.first(before).await? else { return Ok(None) };
+    let same = row.text("fingerprint")? == key.fingerprint;
+    Ok(Some(if same { Added::Before(parse(&row, "job")?) } else { Added::KeyTaken }))
+}
+
 /// Adds a job with a cursor at block 0 of each lane, unless `key` was used before.
 pub(super) async fn add(db: &mut Db, job: NewJob, key: Option<IdempotencyKey>) -> Result<Added> {
     let now = db.now().await?;
-    if let Some(IdempotencyKey { key, fingerprint }) = key {
-        let before = query("SELECT fingerprint, job FROM idempotency WHERE key = $1").bind(&*key);
-        if let Some(row) = db.first(before).await? {
-            let same = row.text("fingerprint")? == fingerprint;
-            return if same { Ok(Added::Before(parse(&row, "job")?)) } else { Ok(Added::KeyTaken) };
+    if let Some(key) = key {
+        if let Some(before) = keyed(db, &key).await? {
+            return Ok(before);
         }
+        let IdempotencyKey { key, fingerprint } = key;
         let insert =
             query("INSERT INTO idempotency (key, fingerprint, job, created_ms) VALUES ($1, $2, $3, $4)");
         db.execute(insert.bind(key).bind(fingerprint).bind(job.id.as_str()).bind(now)).await?;
@@ -75,6 +82,14 @@ pub(super) async fn get(db: &mut Db, id: &JobId) -> Result<Option<JobRow>> {
 pub(super) async fn list(db: &mut Db, filter: JobFilter) -> Result<Vec<JobRow>> {
     let now = db.now().await?;
     let before = filter.before.unwrap_or(i64::MAX);
+    if let Some(text) = filter.text {
+        let sql = "SELECT * FROM job WHERE sequence < $1 AND (state = $3 OR $3 = '')
+             AND (lower(name) LIKE $4 ESCAPE '\\' OR lower(id) LIKE $4 ESCAPE '\\')
+             ORDER BY sequence DESC LIMIT $2";
+        let state = filter.state.map_or("", JobState::name);
+        let rows = query(sql).bind(before).bind(filter.limit).bind(state).bind(pattern(&text));
+        return db.all(rows).await?.iter().map(|row| read(row, now)).collect();
+    }
     let rows = match filter.state {
         None => query("SELECT * FROM job WHERE sequence < $1 ORDER BY sequence DESC LIMIT $2").bind(before),
         Some(state) => {
@@ -84,6 +99,18 @@ pub(super) async fn list(db: &mut Db, filter: JobFilter) -> Result<Vec<JobRow>> 
         }
     };
     db.all(rows.bind(filter.limit)).await?.iter().map(|row| read(row, now)).collect()
+}
+
+/// What LIKE finds `text` with, wherever it is.
+fn pattern(text: &str) -> String {
+    let mut pattern = "%".to_owned();
+    for c in text.chars() {
+        if matches!(c, '%' | '_' | '\\') {
+            pattern.push('\\');
+        }
+        pattern.push(c.to_ascii_lowercase());
+    }
+    pattern + "%"
 }
 
 /// Jobs that are not over or have no last form, the oldest first.

@@ -94,6 +94,10 @@ impl Store for Sql {
         self.writer.write(|db| Box::pin(job::add(db, job, key))).await
     }
 
+    async fn keyed(&self, key: &IdempotencyKey) -> Result<Option<Added>> {
+        job::keyed(&mut self.reader().await?, key).await
+    }
+
     async fn job(&self, id: &JobId) -> Result<Option<JobRow>> {
         job::get(&mut self.reader().await?, id).await
     }

@@ -1,7 +1,10 @@
 //! The one writer: whatever waits while a transaction is made durable goes into the next, together.
 
 use super::{connection::Db, open::Source, query::query};
-use crate::store::error::{Result, StoreError};
+use crate::{
+    fail_point::FailPoint,
+    store::error::{Result, StoreError},
+};
 use futures::future::BoxFuture;
 use std::{
     sync::{Mutex, PoisonError},
@@ -150,7 +153,9 @@ async fn write_group(connection: &mut Db, group: Vec<Change>) -> Health {
         }
     }
     if written.is_ok() {
+        FailPoint::GroupBeforeCommit.pass();
         written = run(connection, "COMMIT").await;
+        FailPoint::GroupAfterCommit.pass();
     }
     if let Err(error) = &written {
         tracing::error!(%error, changes = tells.len(), "a group of changes was not written");
