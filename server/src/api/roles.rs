@@ -19,7 +19,7 @@ const FILES: Access = Access::Roles(&[Role::Read, Role::Submit, Role::Work]);
 const ADMIN: Access = Access::Roles(&[]);
 
 /// Every door: method, path as the router has it, and who may use it. `HEAD` is as `GET`.
-pub const DOORS: [(Method, &str, Access); 28] = [
+pub const DOORS: [(Method, &str, Access); 29] = [
     (Method::POST, "/v1/scenes", SUBMIT),
     (Method::PUT, "/v1/scenes/{id}", SUBMIT),
     (Method::GET, "/v1/scenes/{id}", FILES),
