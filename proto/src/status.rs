@@ -4,6 +4,7 @@ use crate::{
     curve::{CurveRow, LayerError},
     id::{BlobId, JobId, WorkerId},
     job::JobRequest,
+    needs::Needs,
 };
 use jiff::Timestamp;
 use ovtigre_core::{
@@ -119,6 +120,9 @@ pub struct JobStatus {
     /// Where the method is `radiosity` and a sum has come: how the scene was solved, with the residual of every iteration.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub radiosity: Option<RadiosityReport>,
+    /// What it needs of the scene and the program, and what it leaves out.
+    #[serde(default)]
+    pub needs: Needs,
     /// Its layers in order.
     #[serde(default)]
     pub layers: Vec<LayerStatus>,

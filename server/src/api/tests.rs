@@ -153,6 +153,9 @@ async fn a_job_is_rendered_over_http_alone() {
     let status = doors.get(&format!("/v1/jobs/{job}")).await.json();
     assert_eq!((status["state"].as_str(), status["samples_done"].as_f64()), (Some("done"), Some(400.0)));
     assert_eq!(doors.get(&image).await.status, StatusCode::OK);
+    let svg = doors.get(&format!("/v1/jobs/{job}/error.svg")).await;
+    assert_eq!((svg.status, svg.head("content-type")), (StatusCode::OK, "image/svg+xml"));
+    assert!(svg.body.starts_with(b"<svg") && svg.body.windows(7).any(|part| part == b"<circle"));
     let csv = String::from_utf8(doors.get(&format!("/v1/jobs/{job}/error.csv")).await.body.to_vec()).unwrap();
     let rows = doors.get(&format!("/v1/jobs/{job}/error.json")).await.json();
     assert_eq!(csv.lines().count(), 1 + rows["rows"].as_array().unwrap().len());
