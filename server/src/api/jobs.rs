@@ -94,9 +94,16 @@ pub async fn create(
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ListParams {
+    /// Only those in this state.
     state: Option<JobState>,
+    /// Only those whose name or id has this in it.
+    #[schemars(length(max = 200))]
     text: Option<String>,
+    /// Items at most.
+    #[schemars(range(min = 1, max = 500))]
     limit: Option<u32>,
+    /// `next` of the page before.
+    #[schemars(regex(pattern = r"^[0-9]{1,18}$"))]
     cursor: Option<String>,
 }
 

@@ -309,6 +309,7 @@ fn parameters(generator: &mut SchemaGenerator, path: &str, operation: &Operation
     }
     let query = operation.query.map(|schema| schema(generator));
     let fields = query.as_ref().and_then(|schema| schema.get("properties")?.as_object());
+    let required = query.as_ref().and_then(|schema| schema.get("required")?.as_array());
     for (name, field) in fields.into_iter().flatten() {
         let mut field = field.clone();
         let text = field.as_object_mut().and_then(|field| field.remove("description"));
@@ -316,6 +317,9 @@ fn parameters(generator: &mut SchemaGenerator, path: &str, operation: &Operation
         let mut parameter = json!({"name": name, "in": "query", "schema": field});
         if let Some(text) = text {
             parameter["description"] = text;
+        }
+        if required.is_some_and(|names| names.iter().any(|one| one == name)) {
+            parameter["required"] = true.into();
         }
         all.push(parameter);
     }
@@ -351,7 +355,8 @@ fn described(generator: &mut SchemaGenerator, path: &str, access: Access, operat
         Access::Open => json!([]),
         Access::Roles(roles) => {
             let names: Vec<_> = roles.iter().map(|role| role.name()).chain(["admin"]).collect();
-            json!([{"token": names}])
+            // A farm without tokens asks for none.
+            json!([{"token": names}, {}])
         }
     };
     described

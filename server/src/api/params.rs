@@ -46,8 +46,10 @@ impl<T: DeserializeOwned, S: Send + Sync> FromRequestParts<S> for Params<T> {
 #[serde(deny_unknown_fields)]
 pub struct PageParams {
     /// Items at most.
+    #[schemars(range(min = 1, max = 500))]
     pub limit: Option<u32>,
     /// `next` of the page before.
+    #[schemars(regex(pattern = r"^[0-9]{1,18}$"))]
     pub cursor: Option<String>,
 }
 

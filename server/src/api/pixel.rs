@@ -15,7 +15,11 @@ use std::sync::Arc;
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PixelParams {
+    /// Column in the frame, from 0.
+    #[schemars(required)]
     x: Option<u32>,
+    /// Row in the frame, from 0.
+    #[schemars(required)]
     y: Option<u32>,
 }
 

@@ -28,22 +28,27 @@ function between(items, word) {
   return items.flatMap((item, i) => (i > 0 ? [word, item] : [item]));
 }
 
+/** A description: what is between back quotes is code. */
+function said(description) {
+  return (description ?? '').split('`').map((part, i) => (i % 2 === 1 ? el('code', {}, part) : part));
+}
+
 /** The fields of an object. */
 function fields(schema) {
   const required = new Set(schema.required ?? []);
   const rows = Object.entries(schema.properties ?? {}).map(([name, field]) => el('tr', {},
     el('th', { scope: 'row' }, el('code', {}, name), required.has(name) ? null : el('span', { class: 'under' }, 'optional')),
-    el('td', {}, type(field)), el('td', {}, field.description ?? '')));
+    el('td', {}, type(field)), el('td', {}, said(field.description))));
   return rows.length > 0 ? el('div', { class: 'scroll', tabindex: 0, role: 'region', 'aria-label': 'Fields' }, el('table', { class: 'plain' }, el('tbody', {}, rows))) : null;
 }
 
 function schemaPanel([name, schema]) {
   const options = schema.oneOf ?? schema.anyOf ?? [];
   return el('section', { class: 'panel', id: `schema-${name}`, 'aria-label': name }, el('h2', {}, name),
-    schema.description ? el('p', {}, schema.description) : null,
+    schema.description ? el('p', {}, said(schema.description)) : null,
     schema.properties || options.length > 0 ? null : el('p', {}, type({ ...schema, description: undefined })),
     fields(schema),
-    options.length > 0 ? el('ul', {}, options.map((option) => el('li', {}, type(option.properties ? { type: 'object' } : option), option.description ? `: ${option.description}` : '', fields(option)))) : null);
+    options.length > 0 ? el('ul', {}, options.map((option) => el('li', {}, type(option.properties ? { type: 'object' } : option), option.description ? [': ', said(option.description)] : '', fields(option)))) : null);
 }
 
 function media(content) {
@@ -61,7 +66,7 @@ function call(path, method, operation) {
     el('h3', {}, el('span', { class: `verb ${method}` }, method.toUpperCase()), ' ', el('code', {}, path)),
     el('p', {}, operation.summary, '.'),
     el('dl', { class: 'facts' },
-      parameters.map((one) => row(one.in === 'query' ? `?${one.name}=` : one.in === 'path' ? `{${one.name}}` : one.name, one.in === 'header' ? el('span', { class: 'hint' }, 'header') : type(one.schema), one.description ? `: ${one.description}` : '')),
+      parameters.map((one) => row(one.in === 'query' ? `?${one.name}=` : one.in === 'path' ? `{${one.name}}` : one.name, one.in === 'header' ? el('span', { class: 'hint' }, 'header') : type(one.schema), one.description ? [': ', said(one.description)] : '')),
       takes ? row('Takes', takes) : null,
       gives.map(([status, response]) => row(status, between(media(response.content), ' or '), response.content ? '' : response.description)),
       row('May be called by', roles ? roles.join(', ') : 'anybody')));
