@@ -340,3 +340,26 @@ fn a_scene_is_described_without_a_farm() {
     let document: Value = serde_json::from_str(&prints(folder.path(), "check lamp.gltf --json")).unwrap();
     assert_eq!(document["contents"]["placed_triangles"], 4);
 }
+
+#[test]
+fn shells_complete_and_man_has_a_page_for_each_command() {
+    let folder = tempfile::tempdir().unwrap();
+    for shell in ["bash", "zsh", "fish"] {
+        let script = prints(folder.path(), &format!("completions {shell}"));
+        assert!(script.contains("ovtigre") && script.contains("samples"), "{shell}");
+    }
+    refusal(folder.path(), "completions nushell", 2);
+    prints(folder.path(), "manual man1");
+    let pages: Vec<String> = fs::read_dir(folder.path().join("man1"))
+        .unwrap()
+        .map(|page| page.unwrap().file_name().into_string().unwrap())
+        .collect();
+    for command in ["ovtigre", "ovtigre-render", "ovtigre-serve", "ovtigre-compare"] {
+        assert!(pages.contains(&format!("{command}.1")), "{pages:?}");
+        let page = fs::read_to_string(folder.path().join(format!("man1/{command}.1"))).unwrap();
+        assert!(page.contains(".TH ") && page.contains(".SH SYNOPSIS"), "{command}");
+    }
+    let page = fs::read_to_string(folder.path().join("man1/ovtigre-render.1")).unwrap();
+    assert!(page.contains("\\-\\-samples"), "{page}");
+    assert!(!pages.iter().any(|page| page.contains("help")), "{pages:?}");
+}
