@@ -87,6 +87,17 @@ impl Chaos<'_> {
         worker_with(&self.lines[line].url, clock)
     }
 
+    /// Whether too little went wrong, or there was too little that could have suffered.
+    fn is_calm(&self, jobs: usize) -> bool {
+        let Survived { servers_killed, workers_killed, .. } = self.survived;
+        jobs < 3 || servers_killed < 1 || workers_killed < 2 || self.faults() < 30
+    }
+
+    /// Calls that met a fault on a line to a farm.
+    fn faults(&self) -> u64 {
+        self.lines.iter().flat_map(Proxy::faults).map(|(_, times)| times).sum()
+    }
+
     fn harm(&mut self) {
         match self.random.below(10) {
             0..5 => {
@@ -156,7 +167,8 @@ fn assert_survives(name: &str, servers: usize, shared: Option<&Shared>) {
     let mut asked: Vec<(JobId, usize)> = Vec::new();
     let begun = Instant::now();
     let mut open = 0;
-    while begun.elapsed() < Duration::from_secs(seconds) {
+    // On a machine that is busy with other things less happens in that time.
+    while begun.elapsed() < Duration::from_secs(seconds) || chaos.is_calm(asked.len()) {
         if open < 3 {
             let (kind, farm) = (asked.len() % kinds.len(), chaos.random.below(servers));
             let submit = [&["submit", scene.to_str().unwrap()], &kinds[kind].flags[..]].concat();
@@ -183,12 +195,10 @@ fn assert_survives(name: &str, servers: usize, shared: Option<&Shared>) {
             "{name}: the picture of {id} is not that of core alone"
         );
     }
-    let lines = chaos.lines.iter().chain(&bucket);
-    let faults: u64 = lines.flat_map(Proxy::faults).map(|(_, times)| times).sum();
-    let survived = Survived { jobs: jobs.len(), lines: faults, ..chaos.survived };
+    let of_bucket: u64 = bucket.iter().flat_map(Proxy::faults).map(|(_, times)| times).sum();
+    let survived = Survived { jobs: jobs.len(), lines: chaos.faults() + of_bucket, ..chaos.survived };
     eprintln!("{name}, {} s, seed {seed}: {survived:?}", begun.elapsed().as_secs());
-    let Survived { jobs, servers_killed, workers_killed, lines, .. } = survived;
-    assert!(jobs > 2 && servers_killed > 0 && workers_killed > 0 && lines > 20, "too calm: {survived:?}");
+    assert!(survived.jobs >= asked.len() && survived.lines >= 30, "{survived:?}");
 }
 
 #[test]
