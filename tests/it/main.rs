@@ -15,6 +15,7 @@ mod gltf;
 mod lens;
 mod methods;
 mod motion;
+mod mutate;
 mod page;
 mod photons;
 mod radiosity;

@@ -3,9 +3,11 @@
 pub mod browser;
 pub mod calibration;
 pub mod clock;
+pub mod corpus;
 pub mod glb;
 pub mod irradiance;
 pub mod matrix;
+pub mod mutate;
 pub mod picture;
 pub mod program;
 pub mod proxy;
