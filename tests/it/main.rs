@@ -16,6 +16,7 @@ mod hostile;
 mod lens;
 mod methods;
 mod motion;
+mod mutate;
 mod page;
 mod photons;
 mod radiosity;

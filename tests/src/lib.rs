@@ -3,11 +3,13 @@
 pub mod browser;
 pub mod calibration;
 pub mod clock;
+pub mod corpus;
 pub mod glb;
 pub mod hostile;
 pub mod irradiance;
 pub mod matrix;
 pub mod mutation;
+pub mod mutate;
 pub mod picture;
 pub mod program;
 pub mod proxy;

@@ -155,9 +155,14 @@ impl Between {
         self.row.missing_and_grazing(w, self.alpha2, stretched).0
     }
 
+    /// The albedo of the (1 − v·h)⁵ part of the first bounce, for `w.z` > 0.
+    pub(super) fn grazing(&self, w: Vec3, stretched: f32) -> f32 {
+        self.row.missing_and_grazing(w, self.alpha2, stretched).1
+    }
+
     /// Fₘₛ of a mean reflectance.
     #[inline]
-    fn reflected(&self, mean: Rgb) -> Rgb {
+    pub(super) fn reflected(&self, mean: Rgb) -> Rgb {
         let even = 1.0 - self.means.missing;
         mean * mean * even / (Rgb::ONE - mean * self.means.missing)
     }

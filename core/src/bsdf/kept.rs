@@ -6,6 +6,8 @@
 //! has a letter of its own.
 
 use crate::bsdf::event::{Letter, Letters, Transport};
+use crate::bsdf::finish::Finish;
+use crate::bsdf::interface::Interface;
 use crate::bsdf::lobe::{Drawn, Evaluated};
 use crate::bsdf::mixture::Mixture;
 use crate::bsdf::plastic::Plastic;
@@ -13,10 +15,18 @@ use crate::math::colour::{Rgb, luminance};
 use glam::{Vec2, Vec3};
 
 /// Some lobes of a surface.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Kept {
     whole: Mixture,
     letters: Letters,
+    finishes: Option<Box<Finishes>>,
+}
+
+/// Stand for the interfaces of a mixture's conductor and plastic, and for the coupling of its base.
+#[derive(Clone, Debug)]
+pub(super) struct Finishes {
+    pub(super) metal: Finish,
+    pub(super) plastic: Finish,
 }
 
 /// What a surface can consist of.
@@ -44,7 +54,30 @@ const LOBES: [Lobe; 7] = [
 impl Kept {
     /// The lobes of `whole` with one of `letters`; gloss has its twin if `S_T` is one of them.
     pub(super) fn new(whole: &Mixture, letters: Letters) -> Self {
-        Self { whole: *whole, letters }
+        Self { whole: *whole, letters, finishes: None }
+    }
+
+    /// The same with interfaces that have a finish.
+    pub(super) fn finished(whole: &Mixture, letters: Letters, finishes: Option<Finishes>) -> Self {
+        Self { finishes: finishes.map(Box::new), ..Self::new(whole, letters) }
+    }
+
+    fn metal(&self) -> Option<(f32, Interface<'_>)> {
+        let (weight, part) = self.whole.conductor.as_ref()?;
+        let interface = match &self.finishes {
+            None => Interface::Plain(*part),
+            Some(finishes) => Interface::Finished(&finishes.metal),
+        };
+        Some((*weight, interface))
+    }
+
+    fn interface(&self) -> Option<(f32, Interface<'_>)> {
+        let (weight, part) = self.whole.plastic.as_ref()?;
+        let interface = match &self.finishes {
+            None => Interface::Plain(part.interface()),
+            Some(finishes) => Interface::Finished(&finishes.plastic),
+        };
+        Some((*weight, interface))
     }
 
     pub(super) fn letters(&self) -> Letters {
@@ -54,14 +87,11 @@ impl Kept {
 
     /// The letter of a lobe that is there and kept.
     fn letter(&self, lobe: Lobe) -> Option<Letter> {
-        let Mixture { conductor, plastic, glass } = &self.whole;
         let own = match lobe {
-            Lobe::Metal | Lobe::MetalTwin => conductor.as_ref().map(|(_, part)| part.letter()),
-            Lobe::Interface | Lobe::InterfaceTwin => {
-                plastic.as_ref().map(|(_, part)| part.interface_letter())
-            }
-            Lobe::Base => plastic.as_ref().map(|_| Letter::Diffuse),
-            Lobe::Glass | Lobe::GlassTwin => glass.as_ref().map(|(_, part)| part.letter()),
+            Lobe::Metal | Lobe::MetalTwin => self.metal().map(|(_, part)| part.letter()),
+            Lobe::Interface | Lobe::InterfaceTwin => self.interface().map(|(_, part)| part.letter()),
+            Lobe::Base => self.whole.plastic.as_ref().map(|_| Letter::Diffuse),
+            Lobe::Glass | Lobe::GlassTwin => self.whole.glass.as_ref().map(|(_, part)| part.letter()),
         }?;
         let letter = match lobe {
             Lobe::MetalTwin | Lobe::InterfaceTwin | Lobe::GlassTwin => {
@@ -74,19 +104,17 @@ impl Kept {
 
     /// A lobe's weight and its albedo towards `wo`.
     fn weight_and_albedo(&self, lobe: Lobe, wo: Vec3) -> Option<(f32, Rgb)> {
-        let Mixture { conductor, plastic, glass } = &self.whole;
         Some(match lobe {
-            Lobe::Metal => conductor.as_ref().map(|(weight, part)| (*weight, part.albedo(wo)))?,
-            Lobe::MetalTwin => conductor.as_ref().map(|(weight, part)| (*weight, part.mirror(wo)))?,
-            Lobe::Interface => {
-                plastic.as_ref().map(|(weight, part)| (*weight, part.interface().albedo(wo)))?
-            }
-            Lobe::InterfaceTwin => {
-                plastic.as_ref().map(|(weight, part)| (*weight, part.interface().mirror(wo)))?
-            }
-            Lobe::Base => plastic.as_ref().map(|(weight, part)| (*weight, part.base_albedo(wo)))?,
+            Lobe::Metal => self.metal().map(|(weight, part)| (weight, part.albedo(wo)))?,
+            Lobe::MetalTwin => self.metal().map(|(weight, part)| (weight, part.mirror(wo)))?,
+            Lobe::Interface => self.interface().map(|(weight, part)| (weight, part.albedo(wo)))?,
+            Lobe::InterfaceTwin => self.interface().map(|(weight, part)| (weight, part.mirror(wo)))?,
+            Lobe::Base => self.whole.plastic.as_ref().map(|(weight, part)| match &self.finishes {
+                None => (*weight, part.base_albedo(wo)),
+                Some(finishes) => (*weight, finishes.plastic.base_albedo(wo)),
+            })?,
             Lobe::Glass | Lobe::GlassTwin => {
-                glass.as_ref().map(|(weight, part)| (*weight, part.albedo(wo)))?
+                self.whole.glass.as_ref().map(|(weight, part)| (*weight, part.albedo(wo)))?
             }
         })
     }
@@ -128,12 +156,14 @@ impl Kept {
 
     /// `None` for a twin.
     fn evaluate_lobe(&self, lobe: Lobe, wo: Vec3, wi: Vec3, transport: Transport) -> Option<Evaluated> {
-        let Mixture { conductor, plastic, glass } = &self.whole;
         match lobe {
-            Lobe::Metal => conductor.as_ref().map(|(_, part)| part.evaluate(wo, wi)),
-            Lobe::Interface => plastic.as_ref().map(|(_, part)| part.interface().evaluate(wo, wi)),
-            Lobe::Base => plastic.as_ref().map(|(_, part)| part.evaluate_base(wo, wi)),
-            Lobe::Glass => glass.as_ref().map(|(_, part)| part.evaluate(wo, wi, transport)),
+            Lobe::Metal => self.metal().map(|(_, part)| part.evaluate(wo, wi)),
+            Lobe::Interface => self.interface().map(|(_, part)| part.evaluate(wo, wi)),
+            Lobe::Base => self.whole.plastic.as_ref().map(|(_, part)| match &self.finishes {
+                None => part.evaluate_base(wo, wi),
+                Some(finishes) => finishes.plastic.evaluate_base(wo, wi),
+            }),
+            Lobe::Glass => self.whole.glass.as_ref().map(|(_, part)| part.evaluate(wo, wi, transport)),
             Lobe::MetalTwin | Lobe::InterfaceTwin | Lobe::GlassTwin => None,
         }
     }
@@ -163,15 +193,14 @@ impl Kept {
     }
 
     fn draw_lobe(&self, lobe: Lobe, wo: Vec3, u_lobe: f32, u: Vec2, transport: Transport) -> Option<Drawn> {
-        let Mixture { conductor, plastic, glass } = &self.whole;
         match lobe {
-            Lobe::Metal => conductor.as_ref()?.1.draw(wo, u_lobe, u),
-            Lobe::MetalTwin => Some(conductor.as_ref()?.1.draw_mirror(wo, Letter::Mirrored)),
-            Lobe::Interface => plastic.as_ref()?.1.interface().draw(wo, u_lobe, u),
-            Lobe::InterfaceTwin => Some(plastic.as_ref()?.1.interface().draw_mirror(wo, Letter::Mirrored)),
-            Lobe::Base => plastic.as_ref().and_then(|_| Plastic::draw_base(wo, u)),
-            Lobe::Glass => glass.as_ref()?.1.draw(wo, u_lobe, u, transport),
-            Lobe::GlassTwin => glass.as_ref()?.1.draw_twin(wo, u_lobe, transport),
+            Lobe::Metal => self.metal()?.1.draw(wo, u_lobe, u),
+            Lobe::MetalTwin => Some(self.metal()?.1.draw_mirror(wo, Letter::Mirrored)),
+            Lobe::Interface => self.interface()?.1.draw(wo, u_lobe, u),
+            Lobe::InterfaceTwin => Some(self.interface()?.1.draw_mirror(wo, Letter::Mirrored)),
+            Lobe::Base => self.whole.plastic.as_ref().and_then(|_| Plastic::draw_base(wo, u)),
+            Lobe::Glass => self.whole.glass.as_ref()?.1.draw(wo, u_lobe, u, transport),
+            Lobe::GlassTwin => self.whole.glass.as_ref()?.1.draw_twin(wo, u_lobe, transport),
         }
     }
 }

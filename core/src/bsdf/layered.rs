@@ -15,6 +15,7 @@ use crate::bsdf::conductor::{Conductor, upward};
 use crate::bsdf::event::{Letter, Letters, Transport};
 use crate::bsdf::fresnel::Schlick;
 use crate::bsdf::gloss::Gloss;
+use crate::bsdf::interface::Base;
 use crate::bsdf::kept::Kept;
 use crate::bsdf::lobe::{Drawn, Evaluated};
 use crate::bsdf::plastic::Plastic;
@@ -28,12 +29,12 @@ use glam::{Vec2, Vec3};
 const COAT: Schlick = Schlick { f0: Rgb::splat(0.04), f90: 1.0 };
 
 /// Layers and the lobes below that are kept.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Layered {
     coat: Option<Coat>,
     sheen: Option<Sheen>,
     /// Weight of the base that scatters to the other side, and the base, seen as if it did to this.
-    through: Option<(f32, Plastic)>,
+    through: Option<(f32, Base)>,
     below: Kept,
     letters: Letters,
     walls: Walls,
@@ -76,8 +77,8 @@ impl Layered {
     /// Of lobes with one of `letters`, above and below. Numbers are within their ranges.
     pub(super) fn new(
         layers: &Layers,
-        through: Option<(f32, Plastic)>,
-        below: &Kept,
+        through: Option<(f32, Base)>,
+        below: Kept,
         letters: Letters,
         walls: Walls,
     ) -> Self {
@@ -87,7 +88,7 @@ impl Layered {
             frame: Frame::around(layers.coat_normal),
         });
         let sheen = Sheen::new(layers.sheen, layers.sheen_roughness);
-        Self { coat, sheen, through, below: *below, letters, walls }
+        Self { coat, sheen, through, below, letters, walls }
     }
 
     pub(super) fn letters(&self) -> Letters {
@@ -138,7 +139,7 @@ impl Layered {
             Lobe::Below => o.coat * o.sheen * self.below.luminance(wo),
             _ if !o.covered || self.letter(lobe).is_none() => 0.0,
             Lobe::Through => {
-                let albedo = |(weight, part): &(f32, Plastic)| weight * luminance(part.base_albedo(wo));
+                let albedo = |(weight, part): &(f32, Base)| weight * luminance(part.albedo(wo));
                 o.coat * o.sheen * self.through.as_ref().map_or(0.0, albedo)
             }
             Lobe::Coat | Lobe::CoatTwin if o.on_coat.z <= 0.0 => 0.0,
@@ -168,7 +169,7 @@ impl Layered {
             if through > 0.0
                 && let Some((weight, part)) = &self.through
             {
-                let one = part.evaluate_base(wo, -wi);
+                let one = part.evaluate(wo, -wi);
                 all.value.diffuse += one.value.diffuse * (weight * passes * o.sheen.min(i.sheen));
                 all.pdf += one.pdf * through;
             }

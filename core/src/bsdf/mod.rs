@@ -5,13 +5,17 @@
 //! (refraction: f(o→i) / η² symmetric) and no albedo exceeds one.
 
 pub mod albedo;
+mod brushed;
 pub mod conductor;
 pub mod dispersed;
 pub mod event;
+mod film;
+mod finish;
 pub mod fresnel;
 pub mod ggx;
 pub mod glass;
 mod gloss;
+mod interface;
 pub mod kept;
 pub mod lambert;
 pub mod layered;
@@ -31,15 +35,17 @@ mod tests;
 use crate::bsdf::conductor::Conductor;
 use crate::bsdf::dispersed::{Dispersed, indices};
 use crate::bsdf::event::{BsdfSample, Letter, Letters, SampleKind, Scattered, Transport};
+use crate::bsdf::finish::Finish;
 use crate::bsdf::fresnel::{Schlick, dielectric_at_normal};
 use crate::bsdf::glass::Glass;
-use crate::bsdf::kept::Kept;
+use crate::bsdf::interface::Base;
+use crate::bsdf::kept::{Finishes, Kept};
 use crate::bsdf::lambert::Lambert;
 use crate::bsdf::layered::Layered;
 use crate::bsdf::lobe::{Delta, Drawn, Evaluated};
 use crate::bsdf::mixture::Mixture;
 use crate::bsdf::plastic::Plastic;
-use crate::bsdf::surface::{Layers, SurfaceParameters, Walls};
+use crate::bsdf::surface::{Finishing, Layers, SurfaceParameters, Walls};
 use crate::math::colour::Rgb;
 use glam::{Vec2, Vec3};
 
@@ -109,17 +115,31 @@ impl Bsdf {
             let band = |ior| Self::keeping(&SurfaceParameters { ior, layers: rest, ..s }, letters);
             return Self::Dispersed(Box::new(Dispersed::new(indices(s.ior, layers.dispersion).map(band))));
         }
+        let finish = &layers.finish;
+        let alpha = s.roughness * s.roughness;
+        let (metal, plastic) = (Schlick { f0: s.base_color, f90: 1.0 }, over_plastic(&s));
         let mut through = None;
+        let mut base_color = s.base_color;
         if layers.through > 0.0
             && s.walls == Walls::Thin
             && let Some((weight, part)) = &mut below.plastic
         {
-            let of = |base_color| new_plastic(&SurfaceParameters { base_color, ..s });
-            *part = of(s.base_color * (1.0 - layers.through));
-            through = Some((*weight, of(layers.through_color * layers.through)));
+            base_color *= 1.0 - layers.through;
+            *part = Plastic::new(alpha, plastic, base_color);
+            let there = layers.through_color * layers.through;
+            let base = if finish.is_none() {
+                Base::Plain(Plastic::new(alpha, plastic, there))
+            } else {
+                Base::Finished(Box::new(Finish::new(finish, alpha, plastic, there)))
+            };
+            through = Some((*weight, base));
         }
-        let below = Kept::new(&below, letters);
-        Self::Layered(Box::new(Layered::new(layers, through, &below, letters, s.walls)))
+        let finishes = (!finish.is_none()).then(|| Finishes {
+            metal: Finish::new(finish, alpha, metal, Rgb::ZERO),
+            plastic: Finish::new(finish, alpha, plastic, base_color),
+        });
+        let below = Kept::finished(&below, letters, finishes);
+        Self::Layered(Box::new(Layered::new(layers, through, below, letters, s.walls)))
     }
 
     fn whole(s: &SurfaceParameters) -> Self {
@@ -238,8 +258,12 @@ fn new_conductor(s: &SurfaceParameters) -> Conductor {
 }
 
 fn new_plastic(s: &SurfaceParameters) -> Plastic {
+    Plastic::new(s.roughness * s.roughness, over_plastic(s), s.base_color)
+}
+
+fn over_plastic(s: &SurfaceParameters) -> Schlick {
     let f0 = (dielectric_at_normal(s.ior) * s.specular_color).min(Rgb::ONE) * s.specular;
-    Plastic::new(s.roughness * s.roughness, Schlick { f0, f90: s.specular }, s.base_color)
+    Schlick { f0, f90: s.specular }
 }
 
 fn new_glass(s: &SurfaceParameters) -> Glass {
@@ -278,6 +302,13 @@ fn clamped(s: &SurfaceParameters) -> SurfaceParameters {
             dispersion: layers.dispersion.max(0.0).min(f32::MAX),
             through: unit(layers.through),
             through_color: Rgb::from_array(layers.through_color.to_array().map(unit)),
+            finish: Finishing {
+                strength: unit(layers.finish.strength),
+                along: layers.finish.along,
+                film: unit(layers.finish.film),
+                film_ior: layers.finish.film_ior.max(1.0).min(f32::MAX),
+                film_thickness: layers.finish.film_thickness.max(0.0).min(f32::MAX),
+            },
         }),
     }
 }

@@ -1,7 +1,7 @@
 //! What a glTF material says at one point.
 
 use crate::math::colour::Rgb;
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 /// What is behind a transmitting surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,12 +31,44 @@ pub struct Layers {
     pub through_color: Rgb,
     /// 20 over the Abbe number of a solid's glass, not negative; 0 for one index of all colours.
     pub dispersion: f32,
+    /// What is done to the interfaces of metal and plastic.
+    pub finish: Finishing,
+}
+
+/// How an interface differs from an even one without a film (`KHR_materials_anisotropy`, `KHR_materials_iridescence`).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Finishing {
+    /// `anisotropyStrength`, in 0..=1: along the direction α becomes α + (1 − α) strength².
+    pub strength: f32,
+    /// The direction in which the surface is rougher, in the shading frame's x and y; of unit length.
+    pub along: Vec2,
+    /// `iridescenceFactor`, in 0..=1.
+    pub film: f32,
+    /// Refractive index of the film, at least 1.
+    pub film_ior: f32,
+    /// Its thickness in nm, not negative.
+    pub film_thickness: f32,
+}
+
+impl Finishing {
+    /// Even and without a film.
+    pub const NONE: Self =
+        Self { strength: 0.0, along: Vec2::X, film: 0.0, film_ior: 1.3, film_thickness: 400.0 };
+
+    /// Whether it changes anything.
+    pub fn is_none(&self) -> bool {
+        self.strength <= 0.0 && self.film <= 0.0
+    }
 }
 
 impl Layers {
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
-        self.coat <= 0.0 && self.sheen == Rgb::ZERO && self.through <= 0.0 && self.dispersion <= 0.0
+        self.coat <= 0.0
+            && self.sheen == Rgb::ZERO
+            && self.through <= 0.0
+            && self.dispersion <= 0.0
+            && self.finish.is_none()
     }
 }
 

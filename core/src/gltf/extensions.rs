@@ -15,11 +15,13 @@ fn support(name: &str) -> Option<Support> {
     match name {
         "KHR_draco_mesh_compression"
         | "KHR_lights_punctual"
+        | "KHR_materials_anisotropy"
         | "KHR_materials_clearcoat"
         | "KHR_materials_diffuse_transmission"
         | "KHR_materials_dispersion"
         | "KHR_materials_emissive_strength"
         | "KHR_materials_ior"
+        | "KHR_materials_iridescence"
         | "KHR_materials_pbrSpecularGlossiness"
         | "KHR_materials_sheen"
         | "KHR_materials_specular"

@@ -3,11 +3,12 @@
 use crate::gltf::document::{At, Document};
 use crate::gltf::error::{LoadError, Problems};
 use crate::gltf::textures::{TextureTable, UvSets};
+use crate::scene::finish::FinishMaterial;
 use crate::scene::material::{
     Coverage, LayerMaterial, Material, RoughnessMap, Sides, TextureSlot, Textured, Volume,
 };
 use crate::scene::texture::Encoding;
-use glam::{Vec3, Vec4};
+use glam::{Vec2, Vec3, Vec4};
 
 /// A material and the sets of texture coordinates that its two stand for. The absorption of its volume is
 /// still per metre.
@@ -222,10 +223,50 @@ impl Reader<'_> {
         {
             layers.dispersion = dispersion.number_from("dispersion", 0.0)?.unwrap_or(0.0) as f32;
         }
+        layers.finish = self.finish(item, material)?;
         if layers != LayerMaterial::NONE {
             material.layers = Some(Box::new(layers));
         }
         Ok(())
+    }
+
+    /// Brushed facets and a thin film.
+    fn finish(&mut self, item: &At<'_>, material: &Material) -> Result<FinishMaterial, LoadError> {
+        let mut finish = FinishMaterial::NONE;
+        let mut pointers = Vec::new();
+        if let Some(brush) = item.extension("KHR_materials_anisotropy")? {
+            finish.brush.factor = brush.share("anisotropyStrength")?.unwrap_or(0.0);
+            if finish.brush.factor > 0.0 {
+                let (sin, cos) = libm::sincos(brush.number("anisotropyRotation")?.unwrap_or(0.0));
+                finish.rotation = Vec2::new(cos as f32, sin as f32);
+                finish.brush.texture = self.slot(&brush, "anisotropyTexture", Encoding::Linear)?;
+                pointers.push(brush.pointer);
+            }
+        }
+        if let Some(film) = item.extension("KHR_materials_iridescence")? {
+            finish.film.factor = film.share("iridescenceFactor")?.unwrap_or(0.0);
+            if finish.film.factor > 0.0 {
+                finish.film.texture = self.slot(&film, "iridescenceTexture", Encoding::Linear)?;
+                finish.film_ior = film.number_from("iridescenceIor", 1.0)?.unwrap_or(1.3) as f32;
+                let thickness = |key, default: f64| {
+                    film.number_from(key, 0.0).map(|number| number.unwrap_or(default) as f32)
+                };
+                finish.thickness = [
+                    thickness("iridescenceThicknessMinimum", 100.0)?,
+                    thickness("iridescenceThicknessMaximum", 400.0)?,
+                ];
+                let key = "iridescenceThicknessTexture";
+                finish.thickness_map = self.slot(&film, key, Encoding::Linear)?;
+                pointers.push(film.pointer);
+            }
+        }
+        if material.transmission.factor > 0.0 && material.metallic < 1.0 {
+            for pointer in pointers {
+                self.problems
+                    .add(&pointer, "of glass it is left out: what transmits is even and has no film");
+            }
+        }
+        Ok(finish)
     }
 
     /// A normal map and its scale, unless that flattens it.

@@ -132,11 +132,13 @@ static MATERIAL: Schema = Schema {
         free("doubleSided", Flag),
     ],
     extensions: &[
+        ("KHR_materials_anisotropy", &ANISOTROPY),
         ("KHR_materials_clearcoat", &CLEARCOAT),
         ("KHR_materials_diffuse_transmission", &DIFFUSE_TRANSMISSION),
         ("KHR_materials_dispersion", &DISPERSION),
         ("KHR_materials_emissive_strength", &EMISSIVE_STRENGTH),
         ("KHR_materials_ior", &IOR),
+        ("KHR_materials_iridescence", &IRIDESCENCE),
         ("KHR_materials_pbrSpecularGlossiness", &SPECULAR_GLOSSINESS),
         ("KHR_materials_sheen", &SHEEN),
         ("KHR_materials_specular", &SPECULAR),
@@ -152,6 +154,12 @@ static PBR: Schema = plain(&[
     free("metallicFactor", UNIT),
     free("roughnessFactor", UNIT),
     free("metallicRoughnessTexture", Object(&TEXTURE_INFO)),
+]);
+
+static ANISOTROPY: Schema = plain(&[
+    free("anisotropyStrength", UNIT),
+    free("anisotropyRotation", Number(-MOST, MOST)),
+    free("anisotropyTexture", Object(&TEXTURE_INFO)),
 ]);
 
 static CLEARCOAT: Schema = plain(&[
@@ -170,6 +178,15 @@ static DIFFUSE_TRANSMISSION: Schema = plain(&[
 ]);
 
 static DISPERSION: Schema = plain(&[free("dispersion", Number(0.0, MOST))]);
+
+static IRIDESCENCE: Schema = plain(&[
+    free("iridescenceFactor", UNIT),
+    free("iridescenceTexture", Object(&TEXTURE_INFO)),
+    free("iridescenceIor", Number(1.0, MOST)),
+    free("iridescenceThicknessMinimum", Number(0.0, MOST)),
+    free("iridescenceThicknessMaximum", Number(0.0, MOST)),
+    free("iridescenceThicknessTexture", Object(&TEXTURE_INFO)),
+]);
 
 static SHEEN: Schema = plain(&[
     free("sheenColorFactor", COLOUR),

@@ -13,6 +13,7 @@ use crate::gltf::textures::{TextureTable, UvSets};
 use crate::gltf::topology::Mode;
 use crate::gltf::{materials, variants};
 use crate::scene::bounds::Bounds;
+use crate::scene::material::Material;
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 
@@ -157,11 +158,20 @@ pub(crate) fn read(
             dropped.degenerate_triangles += geometry.degenerate;
             let joints = shape.skin.map(|skin| skins[&skin].len());
             check_joints(&geometry, joints, &primitive.pointer, source)?;
+            if is_brushed(&material.material) && geometry.tangents.is_empty() {
+                let detail = "is brushed, but has no tangents and nothing that tells of them (normals and texture \
+                              coordinates): it is not brushed";
+                problems.add(&primitive.pointer, detail);
+            }
             point_out_thin_glass(&geometry, material, problems);
             shape.geometries.push(geometry);
         }
     }
     Ok(read)
+}
+
+fn is_brushed(material: &Material) -> bool {
+    material.layers.as_ref().is_some_and(|layers| layers.finish.brush.factor > 0.0)
 }
 
 fn wanted(read: &materials::Read, shape: &Shape) -> Wanted {
@@ -173,7 +183,13 @@ fn wanted(read: &materials::Read, shape: &Shape) -> Wanted {
         sets.0[list] = read.sets.0[list];
     }
     let coat = material.layers.as_ref().and_then(|layers| layers.coat_normal);
-    let normal_map = material.normal.or(coat).map(|(slot, _)| slot.set as usize);
+    let mut normal_map = material.normal.or(coat).map(|(slot, _)| slot.set as usize);
+    if is_brushed(material) && normal_map.is_none() {
+        let brush = material.layers.as_ref().and_then(|layers| layers.finish.brush.texture);
+        // Without a texture of its own, tangents are along the first set that the material has.
+        normal_map = Some(brush.map_or(0, |slot| slot.set as usize));
+        sets.0[0] = sets.0[0].or(Some(0));
+    }
     let influences = if shape.skin.is_some() { skin::Wanted::Yes } else { skin::Wanted::No };
     Wanted { sets, normal_map, influences, morphs: shape.morphs }
 }

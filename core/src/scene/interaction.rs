@@ -32,6 +32,8 @@ pub struct Interaction<'a> {
     pub shading: Frame,
     /// Unit normal of its coat, on the front side; that of `shading` where there is none.
     pub coat: Vec3,
+    /// Sign of the bitangent over the shading frame's y: 0 without tangents, and where nothing asks.
+    pub bitangent: f32,
     /// Where on its textures.
     pub at: SurfaceCoordinates,
     /// When.
@@ -142,8 +144,26 @@ impl SceneData {
             }
             _ => shading.z,
         };
+        let bitangent = match (&material.layers, normals) {
+            (Some(layers), Normals::Interpolated) if layers.finish.brush.factor > 0.0 => {
+                bitangent(point, placement)
+            }
+            _ => 0.0,
+        };
         let textures = &self.textures;
-        Interaction { position, ng, shading, coat, at, moment, material, material_id, textures, point: on }
+        Interaction {
+            position,
+            ng,
+            shading,
+            coat,
+            bitangent,
+            at,
+            moment,
+            material,
+            material_id,
+            textures,
+            point: on,
+        }
     }
 }
 
@@ -215,6 +235,19 @@ fn shading_frame(
     }
 }
 
+/// The sign of the bitangent over the frame of normal and tangent; 0 where there is no tangent.
+fn bitangent(Place { mesh, triangle, weights, moment }: Place<'_>, placement: &Placement) -> f32 {
+    if mesh.tangents.is_empty() {
+        return 0.0;
+    }
+    let corners = mesh.triangles[triangle as usize].map(|v| v as usize);
+    let mixed = mix(mesh.tangents(corners, moment), weights);
+    if mixed.truncate() == Vec3::ZERO {
+        return 0.0;
+    }
+    1.0_f32.copysign(mixed.w) * placement.handedness().sign()
+}
+
 /// `normal` turned to the side of `ng`; `ng` itself where it lies in the surface.
 #[inline]
 fn front(normal: Vec3, ng: Vec3) -> Vec3 {
@@ -271,7 +304,7 @@ impl Interaction<'_> {
     fn layers(&self, layers: &LayerMaterial) -> Layers {
         let normal = self.shading.to_local(self.coat);
         let normal = if normal.z > 0.0 { normal.normalize() } else { Vec3::Z };
-        layers.at(self.textures, &self.at, normal)
+        layers.at(self.textures, &self.at, normal, self.bitangent)
     }
 
     /// What the surface is made of here.

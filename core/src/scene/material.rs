@@ -2,6 +2,7 @@
 
 use crate::bsdf::surface::{Layers, SurfaceParameters, Walls};
 use crate::math::colour::Rgb;
+use crate::scene::finish::FinishMaterial;
 use crate::scene::texture::{Texture, TextureId};
 use glam::{Affine2, Vec2, Vec3, Vec4};
 
@@ -135,6 +136,8 @@ pub struct LayerMaterial {
     pub through_color: Textured<Rgb>,
     /// 20 over the Abbe number of its glass.
     pub dispersion: f32,
+    /// What is done to the interfaces of metal and plastic.
+    pub finish: FinishMaterial,
 }
 
 impl LayerMaterial {
@@ -148,10 +151,11 @@ impl LayerMaterial {
         through: Textured::constant(0.0),
         through_color: Textured::constant(Vec3::ONE),
         dispersion: 0.0,
+        finish: FinishMaterial::NONE,
     };
 
     /// All texture slots.
-    fn slots(&self) -> [Option<&TextureSlot>; 7] {
+    fn slots(&self) -> [Option<&TextureSlot>; 10] {
         [
             self.coat.texture.as_ref(),
             self.coat_roughness.texture.as_ref(),
@@ -160,6 +164,9 @@ impl LayerMaterial {
             self.sheen_roughness.texture.as_ref(),
             self.through.texture.as_ref(),
             self.through_color.texture.as_ref(),
+            self.finish.brush.texture.as_ref(),
+            self.finish.film.texture.as_ref(),
+            self.finish.thickness_map.as_ref(),
         ]
     }
 
@@ -174,11 +181,18 @@ impl LayerMaterial {
             through: self.through.factor,
             through_color: self.through_color.factor,
             dispersion: self.dispersion,
+            finish: self.finish.without_textures(),
         }
     }
 
-    /// The layers at a point, for the coat's normal in the shading frame.
-    pub fn at(&self, textures: &[Texture], at: &SurfaceCoordinates, coat_normal: Vec3) -> Layers {
+    /// The layers at a point, for the coat's normal in the shading frame and the sign of its bitangent.
+    pub fn at(
+        &self,
+        textures: &[Texture],
+        at: &SurfaceCoordinates,
+        coat_normal: Vec3,
+        bitangent: f32,
+    ) -> Layers {
         let texel = |slot: Option<TextureSlot>| slot.map_or(Vec4::ONE, |slot| slot.sample(textures, at));
         Layers {
             coat: self.coat.factor * texel(self.coat.texture).x,
@@ -189,6 +203,7 @@ impl LayerMaterial {
             through: self.through.factor * texel(self.through.texture).w,
             through_color: self.through_color.factor * texel(self.through_color.texture).truncate(),
             dispersion: self.dispersion,
+            finish: self.finish.at(textures, at, bitangent),
         }
     }
 }

@@ -7,6 +7,7 @@ pub mod distribution;
 pub mod emission;
 pub mod emitter;
 pub mod environment;
+pub mod finish;
 pub mod importance;
 pub mod instance;
 pub mod interaction;

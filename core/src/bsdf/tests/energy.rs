@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::bsdf::event::{SampleKind, Transport};
-use crate::bsdf::surface::Layers;
+use crate::bsdf::surface::{Finishing, Layers};
 
 /// Σ f |cos| / p over a rank-1 lattice; flux, so without the factor of radiance in refraction.
 pub(super) fn albedo(bsdf: &Bsdf, wo: Vec3, points: u32) -> Rgb {
@@ -94,6 +94,84 @@ fn no_layers_gain_energy() {
     }
 }
 
+#[test]
+fn no_finish_gains_energy() {
+    let mut uniform = Uniform(7);
+    for _ in 0..400 {
+        let surface = uniform.finished();
+        let bsdf = Bsdf::from_surface(&surface);
+        let wo = uniform.direction();
+        let found = albedo(&bsdf, wo, 1 << 12).max_element();
+        assert!(found < 1.0 + 2e-2, "{found} towards {wo} of {surface:?}");
+    }
+}
+
+fn finished(surface: SurfaceParameters, finish: Finishing) -> SurfaceParameters {
+    SurfaceParameters { layers: Some(Layers { finish, ..NO_LAYERS }), ..surface }
+}
+
+/// White plastic and metal, over the grid of roughness, strength, azimuth and angle. Towards the horizon the base of plastic is
+/// taken to be under the smoother of its two roughnesses, which lets less through.
+#[test]
+fn brushed_surfaces_gain_nothing_and_plastic_loses_little() {
+    let bright = SurfaceParameters { ior: 2.4, ..PLASTIC };
+    for strength in [0.2, 0.6, 1.0_f32] {
+        for azimuth in [0.0, 0.8, 1.57_f32] {
+            let finish = Finishing { strength, along: Vec2::from_angle(2.0 + azimuth), ..Finishing::NONE };
+            for alpha in [0.0, 0.01, 0.1, 0.5, 1.0] {
+                for angle in [0.5, 50.0, 77.0, 88.5] {
+                    for (surface, least) in [(METAL, 0.3), (PLASTIC, 0.9), (bright, 0.8)] {
+                        let bsdf = rough(alpha, finished(surface, finish));
+                        let found = albedo(&bsdf, tilted(angle, 2.0), 1 << 14).max_element();
+                        assert!(found < 1.0 + 2e-3, "{found}: {finish:?} α {alpha} at {angle}°");
+                        let least = if angle < 60.0 { least } else { 0.3 };
+                        assert!(found > least, "{found}: {finish:?} α {alpha} at {angle}° of {surface:?}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Under a film too, and a film over a metal of reflectance 1 loses nothing but what clamping to 1 takes.
+#[test]
+fn films_gain_nothing() {
+    let grey = SurfaceParameters { base_color: Rgb::splat(0.5), ..METAL };
+    for (film_ior, film_thickness) in [(1.3, 400.0), (2.0, 250.0), (1.8, 1000.0)] {
+        let finish = Finishing { film: 1.0, film_ior, film_thickness, ..Finishing::NONE };
+        for alpha in [0.0, 1e-3, 0.1, 0.5, 1.0] {
+            for angle in [0.5, 50.0, 77.0, 88.5] {
+                for (surface, least) in [(METAL, 0.97), (PLASTIC, 0.5), (grey, -1.0)] {
+                    let found = albedo(&rough(alpha, finished(surface, finish)), tilted(angle, 2.0), 1 << 14);
+                    assert!(found.max_element() < 1.0 + 2e-3, "{found}: {finish:?} α {alpha} at {angle}°");
+                    assert!(found.min_element() > least, "{found}: {finish:?} α {alpha} at {angle}°");
+                }
+            }
+        }
+    }
+}
+
+/// Without strength and with a film of no thickness over an index of its own it is the plain surface.
+#[test]
+fn a_finish_that_changes_nothing_is_none() {
+    let nothing = Finishing { film: 1e-6, ..Finishing::NONE };
+    for alpha in [0.01, 0.3, 1.0] {
+        let (plain, other) = (rough(alpha, METAL), rough(alpha, finished(METAL, nothing)));
+        for angle in [1.0, 50.0, 85.0] {
+            let (wo, wi) = (tilted(angle, 2.0), tilted(angle * 0.9, 5.1));
+            let [a, b] = [&plain, &other].map(|bsdf| bsdf.eval(wo, wi, Transport::Radiance).total().x);
+            assert!((a - b).abs() < 1e-4 * a, "{a} {b}");
+        }
+    }
+    // A little brushed is a little off what is not, but for what bounces on between the facets.
+    let slightly = Finishing { strength: 1e-3, ..Finishing::NONE };
+    let (wo, wi) = (tilted(40.0, 2.0), tilted(41.0, 2.0 + std::f64::consts::PI));
+    for surface in [METAL, PLASTIC] {
+        let of = |surface| rough(0.1, surface).eval(wo, wi, Transport::Radiance).glossy.x;
+        assert!((of(surface) / of(finished(surface, slightly)) - 1.0).abs() < 0.02);
+    }
+}
+
 /// A coat over a white base returns 1 − c² F (1 − F̄) at most, cloth the colour's albedo and what passes beside it.
 #[test]
 fn layers_reflect_what_they_take() {
@@ -109,6 +187,7 @@ fn layers_reflect_what_they_take() {
                     through: 1.0 - coat,
                     through_color: Rgb::ONE,
                     dispersion: 0.0,
+                    finish: Finishing::NONE,
                 };
                 let bsdf = rough(alpha, SurfaceParameters { layers: Some(layers), ..base });
                 for angle in [0.5, 50.0, 77.0, 88.5] {

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::bsdf::event::{SampleKind, Transport};
-use crate::bsdf::surface::Layers;
+use crate::bsdf::surface::{Finishing, Layers};
 
 fn directions() -> Vec<Vec3> {
     let mut all = vec![Vec3::X, Vec3::Z, -Vec3::Z];
@@ -46,11 +46,36 @@ fn values_are_finite_and_not_negative() {
         through: 0.5,
         through_color: Rgb::ONE,
         dispersion: 0.3,
+        finish: Finishing::NONE,
     };
     for surface in [METAL, SOLID] {
         for (coat_roughness, sheen_roughness) in [(0.0, 0.0), (0.04, 0.3), (1.0, 1.0), (f32::NAN, f32::NAN)] {
             let layers = Some(Layers { coat_roughness, sheen_roughness, ..layers });
             surfaces.push(SurfaceParameters { layers, ..surface });
+        }
+    }
+    let edges = [
+        Finishing { strength: 1.0, ..Finishing::NONE },
+        Finishing {
+            strength: 1e-3,
+            film: 1.0,
+            film_ior: f32::MAX,
+            film_thickness: f32::MAX,
+            ..Finishing::NONE
+        },
+        Finishing { film: 0.5, film_ior: 1.0, film_thickness: 0.0, ..Finishing::NONE },
+        Finishing {
+            strength: f32::NAN,
+            film: 1.0,
+            film_ior: f32::NAN,
+            film_thickness: f32::NAN,
+            ..Finishing::NONE
+        },
+    ];
+    for finish in edges {
+        for (alpha, base) in [(0.0_f32, METAL), (1e-3, METAL), (1.0, PLASTIC), (0.0, PLASTIC), (0.1, METAL)] {
+            let layers = Some(Layers { finish, ..NO_LAYERS });
+            surfaces.push(SurfaceParameters { layers, roughness: alpha.sqrt(), ior: 0.0, ..base });
         }
     }
     for surface in surfaces {

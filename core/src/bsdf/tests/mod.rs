@@ -11,7 +11,7 @@ pub(in crate::bsdf) mod oracle;
 mod reciprocity;
 
 use crate::bsdf::Bsdf;
-use crate::bsdf::surface::{Layers, SurfaceParameters, Walls};
+use crate::bsdf::surface::{Finishing, Layers, SurfaceParameters, Walls};
 use crate::math::colour::Rgb;
 use glam::{Vec2, Vec3};
 
@@ -41,6 +41,7 @@ pub(crate) const NO_LAYERS: Layers = Layers {
     through: 0.0,
     through_color: Rgb::ONE,
     dispersion: 0.0,
+    finish: Finishing::NONE,
 };
 
 /// With a roughness such that α is `alpha`.
@@ -111,7 +112,25 @@ impl Uniform {
             through: some(self.next()),
             through_color: Rgb::new(self.next(), self.next(), self.next()),
             dispersion: 0.0,
+            finish: Finishing::NONE,
         };
         SurfaceParameters { layers: Some(layers), ..self.surface() }
+    }
+
+    /// Any surface with a finish, half of them below other layers.
+    pub(crate) fn finished(&mut self) -> SurfaceParameters {
+        let some = |u: f32| if u < 0.3 { 0.0 } else { (u - 0.3) / 0.7 };
+        let turn = std::f32::consts::TAU * self.next();
+        let finish = Finishing {
+            strength: some(self.next()),
+            along: Vec2::from_angle(turn),
+            film: some(self.next()),
+            film_ior: 1.0 + 1.5 * self.next(),
+            film_thickness: 1200.0 * self.next(),
+        };
+        let mut surface = self.layered();
+        let layers = if self.next() < 0.5 { surface.layers.unwrap_or(NO_LAYERS) } else { NO_LAYERS };
+        surface.layers = Some(Layers { finish, ..layers });
+        surface
     }
 }

@@ -67,12 +67,30 @@ fn every_layer_is_reciprocal() {
     assert!(transmitted > 1000 && through > 500, "{transmitted} {through}");
 }
 
+/// Brushed facets and thin films.
+#[test]
+fn every_finish_is_reciprocal() {
+    let mut uniform = Uniform(14);
+    let mut reflected = 0;
+    for _ in 0..20_000 {
+        let surface = uniform.finished();
+        let (wo, wi) = (uniform.direction(), uniform.direction());
+        let there = assert_reciprocal(&surface, wo, wi);
+        reflected += u32::from(wo.z * wi.z > 0.0 && there.glossy.max_element() > 1e-6);
+    }
+    assert!(reflected > 3000, "{reflected}");
+}
+
 #[test]
 fn a_sample_carries_what_eval_and_pdf_say() {
     let mut uniform = Uniform(3);
     let mut smooth = 0;
     for i in 0..40_000 {
-        let bsdf = Bsdf::from_surface(&if i % 2 == 0 { uniform.surface() } else { uniform.layered() });
+        let bsdf = Bsdf::from_surface(&match i % 3 {
+            0 => uniform.surface(),
+            1 => uniform.layered(),
+            _ => uniform.finished(),
+        });
         let wo = uniform.direction();
         let Some(sample) = bsdf.sample(wo, uniform.next(), uniform.pair(), Transport::Radiance) else {
             continue;

@@ -285,3 +285,97 @@ fn a_variant_is_chosen_by_name() {
     let error = load(Some("green")).unwrap_err().to_string();
     assert!(error.contains("\"green\"") && error.contains("\"blue\""), "{error}");
 }
+
+#[test]
+fn brushed_and_filmed_surfaces_are_read_with_their_textures() {
+    let load = |extensions: Value| textured(json!({"extensions": extensions})).load();
+    let loaded = load(json!({
+        "KHR_materials_anisotropy": {"anisotropyStrength": 0.5, "anisotropyRotation": 1.570_796_326_794_896_6,
+            "anisotropyTexture": {"index": 0}},
+        "KHR_materials_iridescence": {"iridescenceFactor": 0.8, "iridescenceTexture": {"index": 0},
+            "iridescenceIor": 1.8, "iridescenceThicknessMinimum": 200, "iridescenceThicknessMaximum": 600,
+            "iridescenceThicknessTexture": {"index": 0}}}));
+    let at = loaded.scene.interaction(0, 0, Vec2::new(0.75, 0.1), Moment::STILL);
+    let finish = at.surface().layers.unwrap().finish;
+    // Texel (1, 0.5, 0): no strength; along the tangent, turned by a quarter to the bitangent.
+    let half = 128.0 / 255.0;
+    assert_eq!((finish.strength, finish.film_ior, finish.film), (0.0, 1.8, 0.8));
+    assert!((finish.film_thickness - (200.0 + 400.0 * half)).abs() < 1e-3, "{finish:?}");
+    assert!((finish.along.x.abs(), finish.along.y.abs()).0 < 0.01, "{finish:?}");
+    assert!(loaded.warnings.iter().all(|w| !w.detail.contains("extension")), "{:?}", loaded.warnings);
+    let plain = load(json!({"KHR_materials_anisotropy": {"anisotropyStrength": 0.5},
+        "KHR_materials_iridescence": {"iridescenceFactor": 1}}));
+    let finish =
+        plain.scene.interaction(0, 0, Vec2::splat(0.2), Moment::STILL).surface().layers.unwrap().finish;
+    assert_eq!((finish.strength, finish.along, finish.film), (0.5, Vec2::X, 1.0));
+    assert_eq!((finish.film_ior, finish.film_thickness), (1.3, 400.0));
+    let none = load(json!({"KHR_materials_anisotropy": {}, "KHR_materials_iridescence": {}}));
+    assert!(none.scene.materials.iter().all(|material| material.layers.is_none()));
+}
+
+/// The direction goes with the layout of the texture coordinates: over a mirrored one, and an instance mirrored in space, the
+/// highlight is the mirror image.
+#[test]
+fn a_brushed_direction_is_in_the_space_of_the_tangents() {
+    let rotation = 0.5_f64;
+    for mirrored in [false, true] {
+        let mut builder = Builder::new();
+        let position = builder.floats("VEC3", &super::builder::TRIANGLE);
+        let normal = builder.floats("VEC3", &[0., 0., 1., 0., 0., 1., 0., 0., 1.]);
+        let uvs = if mirrored { [0., 1., -1., 1., 0., 0.] } else { [0., 1., 1., 1., 0., 0.] };
+        let uv = builder.floats("VEC2", &uvs);
+        builder.primitive(
+            &json!({"attributes": {"POSITION": position, "NORMAL": normal, "TEXCOORD_0": uv}, "material": 0}),
+        );
+        builder.push(
+            "materials",
+            json!({"extensions": {
+            "KHR_materials_anisotropy": {"anisotropyStrength": 1, "anisotropyRotation": rotation}}}),
+        );
+        builder.push("nodes", json!({"mesh": 0, "scale": [-1, 1, 1]}));
+        let scene = builder.load().scene;
+        let side = if mirrored { -1.0 } else { 1.0 };
+        let expected = Vec3::new(libm::cos(rotation) as f32 * side, libm::sin(rotation) as f32, 0.0);
+        for (instance, turn) in [(0, 1.0), (1, -1.0)] {
+            let at = scene.interaction(instance, 0, Vec2::splat(0.3), Moment::STILL);
+            let along = at.surface().layers.unwrap().finish.along;
+            let got = at.shading.to_world(along.extend(0.0));
+            let expected = expected * Vec3::new(turn, 1.0, 1.0);
+            assert!((got - expected).length() < 1e-5, "{got} {expected}");
+        }
+    }
+}
+
+#[test]
+fn what_a_finish_cannot_do_is_pointed_out() {
+    let brushed = json!({"extensions": {"KHR_materials_anisotropy": {"anisotropyStrength": 1}}});
+    let mut builder = Builder::triangle(&[], json!({"material": 0}));
+    builder.push("materials", brushed.clone());
+    let loaded = builder.load();
+    assert!(
+        loaded.warnings.iter().any(|w| w.pointer == "/meshes/0/primitives/0" && w.detail.contains("brushed"))
+    );
+    let at = loaded.scene.interaction(0, 0, Vec2::splat(0.2), Moment::STILL);
+    assert_eq!(at.surface().layers.unwrap().finish.strength, 0.0);
+    let mut glass = brushed;
+    glass["pbrMetallicRoughness"] = json!({"metallicFactor": 0});
+    glass["extensions"]["KHR_materials_transmission"] = json!({"transmissionFactor": 1});
+    let warned = textured(glass).load().warnings;
+    let pointer = "/materials/0/extensions/KHR_materials_anisotropy";
+    assert!(warned.iter().any(|w| w.pointer == pointer && w.detail.contains("glass")), "{warned:?}");
+    for (extension, key, value, part) in [
+        ("KHR_materials_anisotropy", "anisotropyStrength", json!("much"), "anisotropyStrength"),
+        ("KHR_materials_iridescence", "iridescenceIor", json!(0.5), "iridescenceIor"),
+        (
+            "KHR_materials_iridescence",
+            "iridescenceThicknessMaximum",
+            json!(-1),
+            "iridescenceThicknessMaximum",
+        ),
+    ] {
+        let mut members = json!({"iridescenceFactor": 1});
+        members[key] = value;
+        let refused = textured(json!({"extensions": {extension: members}})).refusal();
+        assert!(refused.contains(part) && refused.contains("/materials/0/extensions/"), "{refused}");
+    }
+}
