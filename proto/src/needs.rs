@@ -1,9 +1,10 @@
 //! What a render needs, and what it leaves out.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Of what the program can do, what a render needs, and what it leaves out.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Needs {
     /// What it needs.
     pub needed: Vec<String>,
@@ -12,7 +13,7 @@ pub struct Needs {
 }
 
 /// Something that a render leaves out.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct LeftOut {
     /// What.
     pub what: String,

@@ -102,7 +102,7 @@ impl Chaos<'_> {
             }
             _ => {
                 if let Some(files) = self.files {
-                    take_away(&files.join("jobs"), Duration::from_millis(self.random.next() % 400));
+                    take_away(&files.join("jobs"), Duration::from_millis(self.random.draw() % 400));
                     self.survived.folders_taken += 1;
                 }
             }
@@ -163,7 +163,7 @@ fn assert_survives(name: &str, servers: usize, shared: Option<&Shared>) {
             asked.push((chaos.farms[farm].client(&submit).trim().parse().unwrap(), kind));
         }
         chaos.harm();
-        std::thread::sleep(Duration::from_millis(200 + chaos.random.next() % 600));
+        std::thread::sleep(Duration::from_millis(200 + chaos.random.draw() % 600));
         open = chaos.farms[0].jobs().iter().filter(|job| !job.state.is_over()).count();
     }
     let jobs = chaos.farms[0].settle(name);

@@ -19,6 +19,7 @@ use axum::{
 };
 use ovtigre_core::film::{develop::Develop, size::Size};
 use ovtigre_proto::id::JobId;
+use schemars::JsonSchema;
 use serde::Deserialize;
 use std::sync::Arc;
 
@@ -65,7 +66,7 @@ pub async fn exr(State(farm): State<Arc<Farm>>, Named(name): Named, headers: Hea
 }
 
 /// How the picture is developed.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PngParams {
     layer: Option<String>,

@@ -7,11 +7,12 @@ use super::{
 use crate::farm::Farm;
 use axum::{Json, extract::State};
 use ovtigre_proto::{id::JobId, pixel::Pixel};
+use schemars::JsonSchema;
 use serde::Deserialize;
 use std::sync::Arc;
 
 /// Which pixel.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PixelParams {
     x: Option<u32>,
