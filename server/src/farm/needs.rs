@@ -22,7 +22,10 @@ pub fn needs(scene: &SceneContents, settings: &Settings, words: Letters) -> Need
             _ => need(&mut list, what),
         }
     }
-    scene.leaves_out.iter().for_each(|what| leave(&mut list, what, "the scene has none"));
+    for what in &scene.leaves_out {
+        let why = if what == DEFAULT_SKY { "the scene has light" } else { "the scene has none" };
+        leave(&mut list, what, why);
+    }
     let open = settings.shutter.close > settings.shutter.open;
     let moves = scene.needs.iter().any(|what| MOVING.contains(&what.as_str()));
     either(
