@@ -101,7 +101,7 @@ fn draw(backend: SVGBackend<'_>, title: &str, traces: &[Trace], target: Option<f
     root.present()
 }
 
-fn draw_trace<'a>(chart: &mut Chart<'a, '_>, trace: &Trace, colour: RGBColor) -> Drawn {
+fn draw_trace(chart: &mut Chart<'_, '_>, trace: &Trace, colour: RGBColor) -> Drawn {
     let positive = |points: &[[f64; 2]]| -> Vec<(f64, f64)> {
         points.iter().map(|p| (p[0], p[1])).filter(|(t, e)| *t > 0.0 && *e > 0.0).collect()
     };
@@ -159,6 +159,7 @@ fn ranges(traces: &[Trace], target: Option<f64>) -> Option<[[f64; 2]; 2]> {
 }
 
 /// A number as short as it can be.
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "as labels are formatted")]
 fn number(value: &f64) -> String {
     let digits = (1.0 - value.abs().log10().floor()).clamp(0.0, 9.0) as usize;
     let text = format!("{value:.digits$}");

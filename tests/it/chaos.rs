@@ -137,6 +137,7 @@ fn take_away(folder: &Path, time: Duration) {
 }
 
 /// Torments farms for a while, and asserts that every job is done and every picture that of core alone.
+#[expect(clippy::print_stderr, reason = "says what was survived")]
 fn assert_survives(name: &str, servers: usize, shared: Option<&Shared>) {
     let (seconds, seed) = (number("OVTIGRE_CHAOS_SECONDS", 15), number("OVTIGRE_CHAOS_SEED", 1));
     let folder = tempfile::tempdir().unwrap();

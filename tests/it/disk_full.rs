@@ -31,11 +31,14 @@ fn fill(file: &Path, left: u64) {
 
 /// Fills a disk of 8 MiB to the last byte while a job is rendered, makes room again, and asserts that its picture is that of
 /// core alone. What the farm does while it is full is told by `reserve` GiB.
+#[expect(clippy::print_stderr, reason = "says what is skipped")]
 fn assert_survives_a_full_disk(reserve: &str) {
     let folder = tempfile::tempdir().unwrap();
     let data = folder.path().join("farm");
     let Some(farm) = Farm::start_on_a_disk(&data, 8, &["--reserve", reserve]) else {
-        eprintln!("SKIPPED: a full disk needs a user that may mount one (unshare -rm)");
+        eprintln!(
+            "==== SKIPPED: tests with a full disk (needs a user that may mount one with `unshare -rm`)"
+        );
         return;
     };
     let inside = farm.root().join(data.strip_prefix("/").unwrap());

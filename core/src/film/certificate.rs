@@ -114,8 +114,8 @@ pub struct Culprit {
 ///
 /// Replicate r is compared with the mean o of the others: `q_r = (R−1)/R² · mean over p of [Σ_c (x_r − o)² / 3] / (Y² + ε Ȳ²)`,
 /// Y and Ȳ of the others, too. What r alone has found is thus not hidden by the brightness that it brings itself. The mean C of the
-/// q_r estimates the squared error. The error of this very picture differs from C as m and v of normal numbers do:
-/// their squares' variance is R · Var(C), and Var(C) is (R−1)/(R−2) · s²/R, s the standard deviation of the q_r. On the
+/// `q_r` estimates the squared error. The error of this very picture differs from C as m and v of normal numbers do:
+/// their squares' variance is R · Var(C), and Var(C) is (R−1)/(R−2) · s²/R, s the standard deviation of the `q_r`. On the
 /// logarithm, as squares are not symmetric, `upper² = C · exp(t · s/C · √((R−1)/(R−2)))`, t Student's with R − 1 degrees
 /// of freedom at 6α/(π²k²) for the k-th look.
 ///
@@ -163,7 +163,7 @@ pub fn level(look: u32) -> f64 {
 
 /// Each replicate against the others.
 struct Crossed {
-    /// q_r.
+    /// `q_r`.
     of_replicates: Vec<f64>,
     /// Each pixel's part of their mean.
     of_pixels: Vec<f64>,
@@ -293,14 +293,14 @@ mod tests {
         }
 
         fn normal(&mut self) -> f64 {
-            (-2.0 * self.uniform().ln()).sqrt() * (TAU * self.uniform()).cos()
+            (-2.0 * libm::log(self.uniform())).sqrt() * libm::cos(TAU * self.uniform())
         }
 
         /// Number of successes of probability `p` in `n` trials, by the gaps between them.
         fn binomial(&mut self, n: u32, p: f64) -> u32 {
             let (mut count, mut at) = (0, 0.0);
             loop {
-                at += (self.uniform().ln() / (1.0 - p).ln()).ceil();
+                at += (libm::log(self.uniform()) / libm::log1p(-p)).ceil();
                 if at > f64::from(n) {
                     return count;
                 }
@@ -397,7 +397,8 @@ mod tests {
         // Pareto numbers of exponent 1.2: the mean is 6, the variance infinite.
         let mut noise = Noise(5);
         let mut picture = || {
-            let mut one = || (0..16).map(|_| noise.uniform().powf(-1.0 / 1.2)).sum::<f64>() / 16.0 / 6.0;
+            let mut one =
+                || (0..16).map(|_| libm::pow(noise.uniform(), -1.0 / 1.2)).sum::<f64>() / 16.0 / 6.0;
             (0..PIXELS).map(|_| one()).collect()
         };
         let [share, doubted] = honest(|| grey(4, &mut picture));
@@ -426,7 +427,7 @@ mod tests {
             let look = Look { number: 1, by_chance: Some(brightest) };
             certificate(REGION, &all, 0.0, 64.0, look).unwrap().upper
         };
-        let light = (2.0 / level(1)).ln() / 64.0;
+        let light = libm::log(2.0 / level(1)) / 64.0;
         let alone = 8.0 * light / 16.0 / 1.01_f64.sqrt();
         assert!((upper(8.0) / alone - 1.0).abs() < 1e-12, "{alone}");
         // Brighter light would be seen in the local mean, too.
@@ -470,7 +471,7 @@ mod tests {
         let s = (q.iter().map(|q| (q - centre).powi(2)).sum::<f64>() / 4.0).sqrt();
         // Four degrees of freedom at 0.030396.
         let t = student_t_upper(6.0 * 0.05 / std::f64::consts::PI.powi(2), 4);
-        let expected = (centre * (t * s / centre * (4.0_f64 / 3.0).sqrt()).exp()).sqrt();
+        let expected = (centre * libm::exp(t * s / centre * (4.0_f64 / 3.0).sqrt())).sqrt();
         assert!((of(&replicates).upper / expected - 1.0).abs() < 1e-12);
     }
 }

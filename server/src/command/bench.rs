@@ -142,7 +142,9 @@ impl Bench {
             file => Some(given(Path::new(file), self.size(&contents))?),
         };
         let known = known.map(|(reference, known)| {
-            trials.iter_mut().for_each(|(_, trial)| trial.compare(&reference));
+            for (_, trial) in &mut trials {
+                trial.compare(&reference);
+            }
             known
         });
         Ok(Entry { scene: name, reference: known, trials })

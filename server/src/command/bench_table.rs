@@ -128,8 +128,9 @@ fn table(entry: &Entry, threads: usize) -> String {
     let near =
         if near { " It is hardly closer to the truth than what it judges: give it more time." } else { "" };
     let mut text = format!("### {}\n\n{threads} threads. Reference: {against}.{near}\n\n", entry.scene);
-    text += &format!(
-        "| method | samples | wall s | worker s | estimated | at most | true | error at {:.1} s | seconds to {:.4} | efficiency | slope |\n",
+    let _ = writeln!(
+        text,
+        "| method | samples | wall s | worker s | estimated | at most | true | error at {:.1} s | seconds to {:.4} | efficiency | slope |",
         common.seconds, common.error
     );
     text += "| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n";
@@ -150,7 +151,7 @@ fn table(entry: &Entry, threads: usize) -> String {
             format!("{efficiency} ({low}–{high})"),
             number(summary.slope, 2),
         ];
-        text += &format!("| {} |\n", cells.join(" | "));
+        let _ = writeln!(text, "| {} |", cells.join(" | "));
     }
     text
 }

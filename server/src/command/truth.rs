@@ -21,6 +21,7 @@ pub(crate) struct Truth {
 
 /// How far a picture is from the reference.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[expect(clippy::struct_field_names, reason = "as in reports")]
 pub(crate) struct TrueError {
     /// Samples a pixel in the picture.
     pub(crate) samples: f64,

@@ -70,9 +70,8 @@ impl Finding {
     /// How far off it is, relative to what was expected; of a bound, what was found.
     pub fn off(&self) -> f64 {
         match self.answer {
-            Answer::Estimate { expected: 0.0, got, .. } => got,
+            Answer::Estimate { expected: 0.0, got, .. } | Answer::Bound { got, .. } => got,
             Answer::Estimate { expected, got, .. } => got / expected - 1.0,
-            Answer::Bound { got, .. } => got,
         }
     }
 

@@ -290,7 +290,7 @@ fn a_variant_is_chosen_by_name() {
 fn brushed_and_filmed_surfaces_are_read_with_their_textures() {
     let load = |extensions: Value| textured(json!({"extensions": extensions})).load();
     let loaded = load(json!({
-        "KHR_materials_anisotropy": {"anisotropyStrength": 0.5, "anisotropyRotation": 1.570_796_326_794_896_6,
+        "KHR_materials_anisotropy": {"anisotropyStrength": 0.5, "anisotropyRotation": std::f64::consts::FRAC_PI_2,
             "anisotropyTexture": {"index": 0}},
         "KHR_materials_iridescence": {"iridescenceFactor": 0.8, "iridescenceTexture": {"index": 0},
             "iridescenceIor": 1.8, "iridescenceThicknessMinimum": 200, "iridescenceThicknessMaximum": 600,

@@ -182,7 +182,7 @@ impl World {
             crashes: 0,
             random: Random(random.next()),
         };
-        for _ in 0..1 + random.below(3) {
+        for _ in 0..=random.below(3) {
             let region = Region { x: 0, y: 0, width: 2, height: 1 };
             let (replicates, samples) = (1 + random.below(4) as u32, 200 + random.below(6000) as u32);
             let schedule = Arc::new(Schedule::new(region, 1, replicates, samples));
@@ -504,7 +504,7 @@ impl World {
             }
             10..14 => self.crash(),
             14 if self.durable[job].ended.is_none() && self.random.percent(20) => {
-                self.end(job, Ended::Cancelled)
+                self.end(job, Ended::Cancelled);
             }
             15..20 if self.durable[job].ended.is_none() => {
                 let paused = !self.durable[job].paused;
