@@ -1,6 +1,7 @@
 //! What a picture is asked to be: all that a sum depends on beside scene and batch.
 
 use crate::film::size::Size;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -8,7 +9,7 @@ use std::fmt;
 pub const FULL: &str = "L(D|S)*E";
 
 /// Settings of a render, every default resolved. The same settings give the same bits.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Settings {
     /// The whole frame.
@@ -47,7 +48,7 @@ pub struct Settings {
 }
 
 /// Which camera.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum CameraChoice {
     /// A camera that frames the whole scene.
@@ -57,7 +58,7 @@ pub enum CameraChoice {
 }
 
 /// How light is estimated.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
     /// Paths from the eye, with next event.
@@ -103,7 +104,7 @@ impl Settings {
 }
 
 /// A further picture.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Layer {
     /// Its name in a picture's channels.
     pub name: String,
@@ -112,7 +113,7 @@ pub struct Layer {
 }
 
 /// What a layer shows.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Shows {
     /// The paths of an expression.
@@ -135,7 +136,7 @@ impl fmt::Display for Shows {
 }
 
 /// A technique: how many vertices of a path come from the light, and how many from the eye, light and lens included.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 pub struct Strategy {
     /// Vertices of the light subpath.
     pub s: u32,
@@ -144,7 +145,7 @@ pub struct Strategy {
 }
 
 /// How the techniques of a path are weighed against each other.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Weights {
     /// In proportion to their densities.
@@ -159,7 +160,7 @@ pub enum Weights {
 }
 
 /// How gloss is taken after the first scattering from the light.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Gloss {
     /// As it is.
@@ -170,7 +171,7 @@ pub enum Gloss {
 }
 
 /// When light is let in: seconds of the scene's animation.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Shutter {
     /// Opens.
     pub open: f64,
@@ -179,7 +180,7 @@ pub struct Shutter {
 }
 
 /// A thin lens.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Lens {
     /// Radius of the aperture in metres, positive.
     pub radius: f64,
@@ -188,7 +189,7 @@ pub struct Lens {
 }
 
 /// Light from infinitely far.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Environment {
     /// Where its radiance comes from.
     pub source: EnvironmentSource,
@@ -197,7 +198,7 @@ pub struct Environment {
 }
 
 /// Where an environment's radiance comes from.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum EnvironmentSource {
     /// The same radiance from everywhere, linear Rec.709, W/(sr·m²) a channel.
@@ -207,7 +208,7 @@ pub enum EnvironmentSource {
 }
 
 /// Whether direct light is blocked.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Shadows {
     /// As in nature.

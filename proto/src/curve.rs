@@ -1,10 +1,11 @@
 //! Error against run time.
 
 use ovtigre_core::film::certificate::Doubt;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// One checkpoint. Errors are absent where there is a single replicate.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CurveRow {
     /// Samples a pixel, over all replicates.
     pub samples: u32,
@@ -29,7 +30,7 @@ pub struct CurveRow {
 }
 
 /// One layer at a checkpoint. Errors are absent where there is a single replicate.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LayerError {
     /// Mean luminance over the pixels.
     pub mean_luminance: f64,
@@ -44,7 +45,7 @@ pub struct LayerError {
 }
 
 /// The whole curve of a job.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Curve {
     /// Checkpoints in order.
     pub rows: Vec<CurveRow>,

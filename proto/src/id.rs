@@ -1,5 +1,6 @@
 //! Names of things: newtypes, checked when made.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::{fmt, str::FromStr};
 
@@ -12,10 +13,11 @@ pub struct IdError {
 }
 
 macro_rules! id {
-    ($(#[$doc:meta])* $name:ident, $kind:literal, $check:expr) => {
+    ($(#[$doc:meta])* $name:ident, $kind:literal, $pattern:literal, $check:expr) => {
         $(#[$doc])*
-        #[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+        #[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
         #[serde(try_from = "String", into = "String")]
+        #[schemars(with = "String", extend("pattern" = $pattern))]
         pub struct $name(String);
 
         impl $name {
@@ -67,19 +69,19 @@ fn is_short(text: &str) -> bool {
 
 id!(
     /// The BLAKE3 hash of an uploaded file's bytes, 64 hexadecimal digits.
-    BlobId, "a BLAKE3 hash of 64 hexadecimal digits", |t| is_hex(t, 64)
+    BlobId, "a BLAKE3 hash of 64 hexadecimal digits", "^[0-9a-f]{64}$", |t| is_hex(t, 64)
 );
 id!(
     /// A job.
-    JobId, "a job's id", is_short
+    JobId, "a job's id", "^[A-Za-z0-9_-]{1,64}$", is_short
 );
 id!(
     /// A worker, from its joining until it leaves.
-    WorkerId, "a worker's id", is_short
+    WorkerId, "a worker's id", "^[A-Za-z0-9_-]{1,64}$", is_short
 );
 id!(
     /// A batch handed to a worker for a while.
-    LeaseId, "a lease's id", is_short
+    LeaseId, "a lease's id", "^[A-Za-z0-9_-]{1,64}$", is_short
 );
 
 impl BlobId {

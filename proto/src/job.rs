@@ -8,6 +8,7 @@ use ovtigre_core::{
     film::size::{Region, Size},
     settings::Shadows,
 };
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Samples a pixel where a job does not say.
@@ -18,7 +19,7 @@ pub const REPLICATES_DEFAULT: u32 = 4;
 pub const WIDTH_DEFAULT: u32 = 1280;
 
 /// What is asked for; what is left out gets its default when the job is submitted.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default, expecting = "an object with a job's settings")]
 pub struct JobRequest {
     /// The uploaded scene; required.
@@ -28,9 +29,11 @@ pub struct JobRequest {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
     /// The frame in pixels.
+    #[schemars(with = "Option<pair::WrittenSize>")]
     #[serde(with = "pair::size", skip_serializing_if = "Option::is_none")]
     pub size: Option<Size>,
     /// A camera's name, or its number from 0.
+    #[schemars(with = "Option<pair::NameOrNumber>")]
     #[serde(deserialize_with = "pair::name_or_number", skip_serializing_if = "Option::is_none")]
     pub camera: Option<String>,
     /// A variant of the scene's materials, by name.
@@ -91,6 +94,7 @@ pub struct JobRequest {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub replicates: Option<u32>,
     /// Part of the frame.
+    #[schemars(with = "Option<pair::WrittenRegion>")]
     #[serde(with = "pair::region", skip_serializing_if = "Option::is_none")]
     pub region: Option<Region>,
     /// Higher goes first.
@@ -108,7 +112,7 @@ pub struct JobRequest {
 }
 
 /// A method by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum MethodRequest {
     /// Chosen by the farm.
@@ -126,7 +130,7 @@ pub enum MethodRequest {
 }
 
 /// How the techniques of a path are weighed against each other.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum WeightsRequest {
     /// In proportion to their densities.
@@ -140,7 +144,7 @@ pub enum WeightsRequest {
 }
 
 /// A change to a job; what is left out stays.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default, expecting = "an object with what is to change")]
 pub struct JobPatch {
     /// Higher goes first.

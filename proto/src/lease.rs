@@ -2,10 +2,11 @@
 
 use crate::id::{BlobId, JobId, LeaseId, WorkerId};
 use ovtigre_core::{film::batch::Batch, settings::Settings};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A worker joins.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WorkerJoin {
     /// A name for people.
@@ -22,7 +23,7 @@ pub struct WorkerJoin {
 }
 
 /// The farm's answer.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct WorkerJoined {
     /// Its name on this farm.
     pub id: WorkerId,
@@ -31,7 +32,7 @@ pub struct WorkerJoined {
 }
 
 /// What a worker says at each beat.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Exchange {
     /// Leases that it works at: they are renewed.
@@ -48,7 +49,7 @@ pub struct Exchange {
 }
 
 /// How far a lease is.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LeaseProgress {
     /// Which.
     pub lease: LeaseId,
@@ -57,7 +58,7 @@ pub struct LeaseProgress {
 }
 
 /// The farm's answer.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ExchangeReply {
     /// New batches.
     pub leases: Vec<Lease>,
@@ -70,7 +71,7 @@ pub struct ExchangeReply {
 }
 
 /// A batch handed to a worker for a while.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Lease {
     /// Its name.
     pub id: LeaseId,
@@ -91,7 +92,7 @@ pub struct Lease {
 }
 
 /// What became of an uploaded sum.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Commit {
     /// It counts.
@@ -103,14 +104,14 @@ pub enum Commit {
 }
 
 /// The answer to an uploaded sum.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Committed {
     /// What became of it.
     pub commit: Commit,
 }
 
 /// A batch given back.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LeaseFailure {
     /// Why, for people.
@@ -120,7 +121,7 @@ pub struct LeaseFailure {
 }
 
 /// Whose fault a failure seems.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FailureKind {
     /// The worker is leaving; nothing is wrong.

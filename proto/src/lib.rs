@@ -5,6 +5,7 @@ pub mod curve;
 pub mod id;
 pub mod job;
 pub mod lease;
+pub mod needs;
 pub mod pair;
 pub mod pixel;
 pub mod problem;

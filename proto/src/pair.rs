@@ -1,6 +1,7 @@
 //! Sizes, regions and colours as users write them: as text, as a list, or as an object.
 
 use ovtigre_core::film::size::{Region, Size};
+use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serializer, de::Error as _};
 
 #[derive(Deserialize)]
@@ -68,6 +69,40 @@ fn join(numbers: &[u32], between: &str) -> String {
     numbers.iter().map(ToString::to_string).collect::<Vec<_>>().join(between)
 }
 
+/// A size as it may be written.
+#[derive(Debug, JsonSchema)]
+#[schemars(untagged)]
+pub enum WrittenSize {
+    /// `1280x720`
+    Text(String),
+    /// Width and height.
+    List([u32; 2]),
+    /// By name.
+    Object(Size),
+}
+
+/// A region as it may be written.
+#[derive(Debug, JsonSchema)]
+#[schemars(untagged)]
+pub enum WrittenRegion {
+    /// `x,y,width,height`
+    Text(String),
+    /// The same four numbers.
+    List([u32; 4]),
+    /// By name.
+    Object(Region),
+}
+
+/// A name, or a number from 0.
+#[derive(Debug, JsonSchema)]
+#[schemars(untagged)]
+pub enum NameOrNumber {
+    /// From 0.
+    Number(u32),
+    /// As the scene has it.
+    Name(String),
+}
+
 /// A camera's name or number, from text or a number.
 pub fn name_or_number<'de, D: Deserializer<'de>>(from: D) -> Result<Option<String>, D::Error> {
     #[derive(Deserialize)]
@@ -83,7 +118,7 @@ pub fn name_or_number<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Strin
 }
 
 /// A radiance `"r,g,b"` or `[r, g, b]`, or the hash of an uploaded image; written as given.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum EnvironmentRequest {
     /// The same radiance from everywhere, linear Rec.709.

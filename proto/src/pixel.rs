@@ -1,11 +1,12 @@
 //! One pixel of a picture.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A pixel of a job's picture so far.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Pixel {
-    /// The set of batches in it: as the picture's ETag.
+    /// The set of batches in it: as the picture's `ETag`.
     pub manifest: String,
     /// Its column in the frame.
     pub x: u32,
@@ -16,7 +17,7 @@ pub struct Pixel {
 }
 
 /// What a plane has at a pixel, linear Rec.709.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PixelValue {
     /// `picture`, or the layer's name.
     pub name: String,

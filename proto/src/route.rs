@@ -26,7 +26,7 @@ pub fn job(id: &JobId) -> String {
     format!("{JOBS}/{id}")
 }
 
-/// Something of a job: `events`, `image.exr`, `image.png`, `error.json`, `error.csv`.
+/// Something of a job: `events`, `image.exr`, `image.png`, `error.json`, `error.csv`, `error.svg`.
 pub fn job_part(id: &JobId, part: &str) -> String {
     format!("{JOBS}/{id}/{part}")
 }

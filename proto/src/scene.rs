@@ -1,10 +1,11 @@
 //! What the farm says of an uploaded scene.
 
 use crate::id::BlobId;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// How much of a file that is uploaded in parts is there.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct PartsReceived {
     /// Bytes that are there from the first on, without a gap.
     pub received: u64,
@@ -13,7 +14,7 @@ pub struct PartsReceived {
 }
 
 /// What is in an uploaded file.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SceneReport {
     /// The hash of its bytes.
     pub id: BlobId,
@@ -25,7 +26,7 @@ pub struct SceneReport {
 }
 
 /// What kind of file, and what is in it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 #[expect(clippy::large_enum_variant, reason = "one an upload, and most are scenes")]
 pub enum SceneContent {
@@ -44,7 +45,7 @@ pub enum SceneContent {
 }
 
 /// Counts and findings of a scene.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SceneContents {
     /// Triangles, each instance counted.
     pub triangles: u64,
@@ -90,7 +91,7 @@ pub struct SceneContents {
 }
 
 /// Emitters of each kind.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct LightCounts {
     /// Triangles that emit.
     pub emissive_triangles: u64,
@@ -103,7 +104,7 @@ pub struct LightCounts {
 }
 
 /// Something in a scene that a user should know of.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct SceneWarning {
     /// JSON pointer into the document; empty for the whole.
     pub pointer: String,

@@ -4,15 +4,17 @@ use crate::{
     curve::{CurveRow, LayerError},
     id::{BlobId, JobId, WorkerId},
     job::JobRequest,
+    needs::Needs,
 };
 use jiff::Timestamp;
 use ovtigre_core::{
     film::size::Region, path::reach::Unreachable, radiosity::report::RadiosityReport, settings::Settings,
 };
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Where a job is in its life.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum JobState {
     /// No batch was handed out yet.
@@ -49,7 +51,7 @@ impl JobState {
 }
 
 /// A job, seen from outside.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct JobStatus {
     /// Its name on this farm.
     pub id: JobId,
@@ -118,6 +120,9 @@ pub struct JobStatus {
     /// Where the method is `radiosity` and a sum has come: how the scene was solved, with the residual of every iteration.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub radiosity: Option<RadiosityReport>,
+    /// What it needs of the scene and the program, and what it leaves out.
+    #[serde(default)]
+    pub needs: Needs,
     /// Its layers in order.
     #[serde(default)]
     pub layers: Vec<LayerStatus>,
@@ -132,7 +137,7 @@ pub struct JobStatus {
 }
 
 /// A layer of a job, seen from outside.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LayerStatus {
     /// Its name.
     pub name: String,
@@ -144,7 +149,7 @@ pub struct LayerStatus {
 }
 
 /// A worker, seen from outside.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct WorkerStatus {
     /// Its name on this farm.
     pub id: WorkerId,
@@ -181,7 +186,7 @@ pub struct WorkerStatus {
 }
 
 /// How a worker stands.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum WorkerState {
     /// Heard of lately.
@@ -197,7 +202,8 @@ pub enum WorkerState {
 }
 
 /// One page of a list.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(rename = "{T}Page")]
 pub struct Page<T> {
     /// The items.
     pub items: Vec<T>,
@@ -207,7 +213,7 @@ pub struct Page<T> {
 }
 
 /// How many workers the queue could use now.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Scaling {
     /// Workers that would have something to do.
     pub desired_workers: u32,
@@ -218,7 +224,7 @@ pub struct Scaling {
 }
 
 /// A server-sent event's data.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "event", rename_all = "snake_case")]
 pub enum JobEvent {
     /// The job changed.

@@ -84,7 +84,7 @@ fn draw(backend: SVGBackend<'_>, title: &str, traces: &[Trace], target: Option<f
     let mut mesh = chart.configure_mesh();
     mesh.x_desc("run time in seconds").y_desc("relative error").label_style(("sans-serif", 14));
     mesh.light_line_style(RGBColor(238, 238, 238)).bold_line_style(RGBColor(215, 215, 215));
-    mesh.max_light_lines(3).x_labels(8).x_label_formatter(&number).y_label_formatter(&number).draw()?;
+    mesh.max_light_lines(3).x_labels(14).x_label_formatter(&number).y_label_formatter(&number).draw()?;
     if let Some(target) = target {
         let line = LineSeries::new([(times[0], target), (times[1], target)], TARGET.stroke_width(2));
         chart

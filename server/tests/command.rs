@@ -111,7 +111,7 @@ impl Drop for Process {
 /// A farm, and its address.
 struct Farm {
     address: String,
-    _process: Process,
+    process: Process,
 }
 
 impl Farm {
@@ -121,7 +121,7 @@ impl Farm {
         let mut child = command(folder, &arguments).stderr(Stdio::null()).spawn().unwrap();
         let mut address = String::new();
         BufReader::new(child.stdout.take().unwrap()).read_line(&mut address).unwrap();
-        Self { address: address.trim().to_owned(), _process: Process(child) }
+        Self { address: address.trim().to_owned(), process: Process(child) }
     }
 }
 
@@ -245,6 +245,20 @@ fn a_worker_told_to_leave_leaves_in_peace() {
     assert!(workers.contains("gone") && !workers.contains("active"), "{workers}");
 }
 
+#[test]
+fn a_farm_whose_terminal_is_closed_leaves_in_peace() {
+    let folder = scene();
+    let mut farm = Farm::start(folder.path(), "127.0.0.1:0", 1);
+    prints(folder.path(), &format!("status --server {}", farm.address));
+    signal(&farm.process.0, "HUP");
+    let began = Instant::now();
+    while farm.process.0.try_wait().unwrap().is_none() && began.elapsed() < Duration::from_secs(20) {
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    assert!(farm.process.0.try_wait().unwrap().is_some_and(|ended| ended.success()));
+    assert!(!folder.path().join("farm/farm.sqlite-wal").exists(), "the log is folded into the file");
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn no_worker_outlives_a_killed_render() {
@@ -311,6 +325,9 @@ fn what_cannot_be_done_is_one_clear_line() {
     }
     refused("render lamp.gltf --samples many", 2);
     refused("serve --listen 0.0.0.0:0", 2);
+    for data in ["empty.glb", "empty.glb/below", "/dev/null/below"] {
+        assert!(refused(&format!("serve --listen 127.0.0.1:0 --data {data}"), 2).contains(data));
+    }
     refused("compare nothing.exr nothing.exr", 2);
     assert!(refused("status --server http://127.0.0.1:1", 3).contains("127.0.0.1:1"));
 }
@@ -322,4 +339,27 @@ fn a_scene_is_described_without_a_farm() {
     assert!(printed.contains("emissive triangles"), "{printed}");
     let document: Value = serde_json::from_str(&prints(folder.path(), "check lamp.gltf --json")).unwrap();
     assert_eq!(document["contents"]["placed_triangles"], 4);
+}
+
+#[test]
+fn shells_complete_and_man_has_a_page_for_each_command() {
+    let folder = tempfile::tempdir().unwrap();
+    for shell in ["bash", "zsh", "fish"] {
+        let script = prints(folder.path(), &format!("completions {shell}"));
+        assert!(script.contains("ovtigre") && script.contains("samples"), "{shell}");
+    }
+    refusal(folder.path(), "completions nushell", 2);
+    prints(folder.path(), "manual man1");
+    let pages: Vec<String> = fs::read_dir(folder.path().join("man1"))
+        .unwrap()
+        .map(|page| page.unwrap().file_name().into_string().unwrap())
+        .collect();
+    for command in ["ovtigre", "ovtigre-render", "ovtigre-serve", "ovtigre-compare"] {
+        assert!(pages.contains(&format!("{command}.1")), "{pages:?}");
+        let page = fs::read_to_string(folder.path().join(format!("man1/{command}.1"))).unwrap();
+        assert!(page.contains(".TH ") && page.contains(".SH SYNOPSIS"), "{command}");
+    }
+    let page = fs::read_to_string(folder.path().join("man1/ovtigre-render.1")).unwrap();
+    assert!(page.contains("\\-\\-samples"), "{page}");
+    assert!(!pages.iter().any(|page| page.contains("help")), "{pages:?}");
 }

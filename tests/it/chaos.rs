@@ -87,6 +87,17 @@ impl Chaos<'_> {
         worker_with(&self.lines[line].url, clock)
     }
 
+    /// Whether too little went wrong, or there was too little that could have suffered.
+    fn is_calm(&self, jobs: usize) -> bool {
+        let Survived { servers_killed, workers_killed, .. } = self.survived;
+        jobs < 3 || servers_killed < 1 || workers_killed < 2 || self.faults() < 30
+    }
+
+    /// Calls that met a fault on a line to a farm.
+    fn faults(&self) -> u64 {
+        self.lines.iter().flat_map(Proxy::faults).map(|(_, times)| times).sum()
+    }
+
     fn harm(&mut self) {
         match self.random.below(10) {
             0..5 => {
@@ -102,7 +113,7 @@ impl Chaos<'_> {
             }
             _ => {
                 if let Some(files) = self.files {
-                    take_away(&files.join("jobs"), Duration::from_millis(self.random.next() % 400));
+                    take_away(&files.join("jobs"), Duration::from_millis(self.random.draw() % 400));
                     self.survived.folders_taken += 1;
                 }
             }
@@ -156,14 +167,15 @@ fn assert_survives(name: &str, servers: usize, shared: Option<&Shared>) {
     let mut asked: Vec<(JobId, usize)> = Vec::new();
     let begun = Instant::now();
     let mut open = 0;
-    while begun.elapsed() < Duration::from_secs(seconds) {
+    // On a machine that is busy with other things less happens in that time.
+    while begun.elapsed() < Duration::from_secs(seconds) || chaos.is_calm(asked.len()) {
         if open < 3 {
             let (kind, farm) = (asked.len() % kinds.len(), chaos.random.below(servers));
             let submit = [&["submit", scene.to_str().unwrap()], &kinds[kind].flags[..]].concat();
             asked.push((chaos.farms[farm].client(&submit).trim().parse().unwrap(), kind));
         }
         chaos.harm();
-        std::thread::sleep(Duration::from_millis(200 + chaos.random.next() % 600));
+        std::thread::sleep(Duration::from_millis(200 + chaos.random.draw() % 600));
         open = chaos.farms[0].jobs().iter().filter(|job| !job.state.is_over()).count();
     }
     let jobs = chaos.farms[0].settle(name);
@@ -183,12 +195,10 @@ fn assert_survives(name: &str, servers: usize, shared: Option<&Shared>) {
             "{name}: the picture of {id} is not that of core alone"
         );
     }
-    let lines = chaos.lines.iter().chain(&bucket);
-    let faults: u64 = lines.flat_map(Proxy::faults).map(|(_, times)| times).sum();
-    let survived = Survived { jobs: jobs.len(), lines: faults, ..chaos.survived };
+    let of_bucket: u64 = bucket.iter().flat_map(Proxy::faults).map(|(_, times)| times).sum();
+    let survived = Survived { jobs: jobs.len(), lines: chaos.faults() + of_bucket, ..chaos.survived };
     eprintln!("{name}, {} s, seed {seed}: {survived:?}", begun.elapsed().as_secs());
-    let Survived { jobs, servers_killed, workers_killed, lines, .. } = survived;
-    assert!(jobs > 2 && servers_killed > 0 && workers_killed > 0 && lines > 20, "too calm: {survived:?}");
+    assert!(survived.jobs >= asked.len() && survived.lines >= 30, "{survived:?}");
 }
 
 #[test]

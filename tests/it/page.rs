@@ -74,6 +74,10 @@ fn a_scene_becomes_a_picture_with_the_page_alone() {
     pictures_are_compared(&browser);
     jobs_are_listed_and_cancelled(&browser, &farm, &job);
     workers_are_listed_and_drained(&browser);
+    browser.press("Interface");
+    browser.until("document.querySelectorAll('.call').length > 20");
+    assert!(text_of(&browser, "#schema-JobRequest").contains("relative error is certified"));
+    seen(&browser, "interface");
 }
 
 /// From a file to a job; its id.
@@ -180,7 +184,7 @@ fn jobs_are_listed_and_cancelled(browser: &Browser, farm: &Farm, job: &str) {
     for name in ["alpha", "beta"] {
         assert_eq!(browser.run(submit, &[json!(name), farm.job(job)["scene"].take()]), 202);
     }
-    browser.press("Jobs");
+    browser.click("nav a[data-view=jobs]");
     browser.until("document.querySelectorAll('.jobs-table tbody tr').length === 3");
     assert_eq!(browser.value("document.querySelectorAll('.jobs-table img').length"), 0);
     browser.until("document.querySelectorAll('.thumb canvas').length >= 1");
@@ -211,7 +215,7 @@ fn jobs_are_listed_and_cancelled(browser: &Browser, farm: &Farm, job: &str) {
 }
 
 fn workers_are_listed_and_drained(browser: &Browser) {
-    browser.press("Workers");
+    browser.click("nav a[data-view=workers]");
     browser.until("document.querySelector('table').textContent.includes('local-1')");
     browser.until("!document.querySelector('.numbers dd').textContent.includes('–')");
     seen(browser, "workers");
@@ -250,6 +254,17 @@ fn folders_and_hashes_are_made_in_the_browser() {
         return [one.name, id === report.id, report.triangles, parts.at(-1), id === await hashOf(again.blob)];";
     let sent = browser.run(sent, &[json!(document.to_string()), json!(&glb[20 + length + 8..])]);
     assert_eq!(sent, json!(["lamp.zip", true, 4, 1, true]));
+    // A file in parts, of which one is there already.
+    let parts = "const { upload, send } = await import('/page/client.js'); const blob = new Blob([Uint8Array.from(a[0])]);
+        const path = `/v1/scenes/${a[1]}`; const size = Math.ceil(blob.size / 5);
+        await fetch(path, { method: 'PUT', body: blob.slice(0, size), headers: { 'content-range': `bytes 0-${size - 1}/${blob.size}` } });
+        const parts = []; const report = await upload(path, blob, (part) => parts.push(part), undefined, size);
+        return [report.id === a[1], parts.every((part) => part >= 0.2 || part === 0), parts.at(-1)];";
+    let mut longer = Glb::new();
+    add(&mut longer, "floor", lambert(0.5, 1.0), floor(0.0, 3.0, 0.0, 0.0));
+    let longer = longer.finish();
+    let sent = browser.run(parts, &[json!(longer), json!(blake3::hash(&longer).to_hex().as_str())]);
+    assert_eq!(sent, json!([true, true, 1]));
     // What is dropped is taken like what is chosen.
     browser.press("New job");
     let drop = "const transfer = new DataTransfer(); transfer.items.add(new File([Uint8Array.from(a[0])], 'lamp.glb'));

@@ -1,4 +1,4 @@
-//! A real browser, without a window, driven over WebDriver (W3C) and Chromium's own protocol.
+//! A real browser, without a window, driven over `WebDriver` (W3C) and Chromium's own protocol.
 
 use base64::{Engine as _, engine::general_purpose::STANDARD as BASE64};
 use ovtigre_proto::client::tls;

@@ -119,7 +119,7 @@ fn change_words(bytes: &mut [u8], random: &mut Random) {
             8 => u32::MAX,
             9 => 1 << 31,
             10 => 65_535,
-            _ => random.next() as u32,
+            _ => random.draw() as u32,
         };
         bytes[at..at + 4].copy_from_slice(&word.to_le_bytes());
     }

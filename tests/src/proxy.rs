@@ -52,7 +52,7 @@ impl Random {
     }
 
     /// The next number.
-    pub fn next(&mut self) -> u64 {
+    pub fn draw(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut x = self.0;
         x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -62,12 +62,12 @@ impl Random {
 
     /// One of 0 to `n` − 1.
     pub fn below(&mut self, n: usize) -> usize {
-        (self.next() % n as u64) as usize
+        (self.draw() % n as u64) as usize
     }
 
     /// True with that probability.
     pub fn happens(&mut self, probability: f64) -> bool {
-        (self.next() >> 11) as f64 / ((1_u64 << 53) as f64) < probability
+        (self.draw() >> 11) as f64 / ((1_u64 << 53) as f64) < probability
     }
 }
 
@@ -136,7 +136,7 @@ impl Line {
     fn draw(&self) -> (Option<Fault>, Duration) {
         let mut random = self.random.lock().unwrap_or_else(PoisonError::into_inner);
         let fault = random.happens(self.share).then(|| Fault::ALL[random.below(Fault::ALL.len())]);
-        (fault, Duration::from_millis(random.next() % 700))
+        (fault, Duration::from_millis(random.draw() % 700))
     }
 
     async fn forward(&self, call: &Call) -> Response {

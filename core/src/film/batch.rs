@@ -1,11 +1,12 @@
 //! The unit of work: which samples of which pixels.
 
 use super::size::Region;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::{fmt, ops::Range};
 
 /// A run of sample indices of one replicate, by its place in the schedule.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 pub struct Block {
     /// Place in the schedule, from 0.
     pub index: u32,
@@ -23,7 +24,7 @@ impl Block {
 }
 
 /// Some samples of some pixels. Its sum is a pure function of (scene, settings, batch).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 pub struct Batch {
     /// Which pixels.
     pub region: Region,

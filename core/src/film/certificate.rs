@@ -5,6 +5,7 @@ use super::{
     size::Region,
 };
 use crate::math::quantile::student_t_upper;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -48,7 +49,7 @@ pub struct Certificate {
 }
 
 /// Why an error is not certified, whatever its upper end.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Doubt {
     /// What is wrong.
     pub cause: Cause,
@@ -78,7 +79,7 @@ impl fmt::Display for Doubt {
 }
 
 /// What is wrong with an error.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Cause {
     /// Nearly all of it is in a few pixels.
@@ -98,7 +99,7 @@ impl Cause {
 }
 
 /// A pixel that much of the error is in.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Culprit {
     /// From the left of the frame.
     pub x: u32,

@@ -308,6 +308,9 @@ fn invalid_from(text: &str) -> Option<InvalidSamples> {
     }
 }
 
+/// Bytes of pixels that one byte of a file stands for, at most: DEFLATE makes one of 1032, the others more.
+const BYTES_OF_ONE: u64 = 4096;
+
 /// All channels of the first part of any flat EXR as f32.
 pub fn read_layers(bytes: &[u8]) -> Result<Layers, ExrError> {
     decode(bytes, 1 << 31)
@@ -320,6 +323,11 @@ fn decode(bytes: &[u8], values_max: u64) -> Result<Layers, ExrError> {
         let got = header.layer_size.area() as u64 * header.channels.list.len() as u64;
         if got > values_max {
             return Err(ExrError::TooLarge { got, limit: values_max });
+        }
+        // Memory is taken before the pixels are read, and none of the compressions makes that little of so many.
+        if got.saturating_mul(2) > BYTES_OF_ONE * bytes.len() as u64 {
+            let reason = format!("{} bytes cannot hold the {got} values that it announces", bytes.len());
+            return Err(ExrError::Unreadable(reason));
         }
     }
     let image = read()
@@ -414,6 +422,12 @@ mod tests {
             assert!(read_partial(&bytes[..end], 6).is_err(), "cut at {end} of {}", bytes.len());
         }
         assert!(matches!(read_partial(&bytes, 0), Err(ExrError::TooLarge { .. })));
+        // A window of many pixels in a file of few bytes takes no memory.
+        let window = bytes.windows(11).position(|at| at == b"dataWindow\0").unwrap() + 11 + 6 + 4;
+        let mut vast = bytes.clone();
+        vast[window + 8..window + 16].copy_from_slice(&[0xff, 0x0f, 0, 0, 0xff, 0x0f, 0, 0]);
+        let refused = read_layers(&vast).unwrap_err().to_string();
+        assert!(refused.contains("cannot hold"), "{refused}");
         let mut nan = sum();
         nan.planes[1][4][2] = f32::NAN;
         let bytes = write_partial(&nan, Size { width: 8, height: 4 }, &attributes());

@@ -1,10 +1,11 @@
 //! Pixels of a frame, and rectangles of them.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::{fmt, str::FromStr};
 
 /// Width and height of a frame in pixels; both at least 1.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 pub struct Size {
     /// Columns.
     pub width: u32,
@@ -51,7 +52,7 @@ impl FromStr for Size {
 }
 
 /// A rectangle of pixels of a frame; row 0 is the top.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 pub struct Region {
     /// First column.
     pub x: u32,

@@ -131,7 +131,9 @@ mod tests {
         let [a, b, c] = [1.0, 2.0, 3.0].map(Vec3::splat);
         let mut media = Media::VACUUM;
         let inside = |media: &Media| media.absorptions[..media.depth].to_vec();
-        [a, b, c].map(|one| media.enter(one));
+        for one in [a, b, c] {
+            media.enter(one);
+        }
         media.leave(a);
         assert_eq!(inside(&media), [b, c]);
         media.leave(c);

@@ -7,6 +7,7 @@
 use crate::bsdf::event::{Letter, Letters};
 use crate::path::expression::language::{EyeState, Language, LightTag};
 use crate::settings::Method;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
@@ -18,7 +19,7 @@ const COUNTED_MAX: u32 = 8;
 const TRIED_MAX: usize = 1 << 14;
 
 /// A kind of light.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum LightKind {
     /// Emissive surfaces.
@@ -52,7 +53,7 @@ pub struct Surroundings {
 }
 
 /// Paths that are asked for and not made.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Unreachable {
     /// From which lights.
     pub light: LightKind,
@@ -69,7 +70,7 @@ pub struct Unreachable {
 }
 
 /// Words of one length from one kind of light.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Share {
     /// Letters between L and E.
     pub scatterings: u32,

@@ -293,7 +293,8 @@ impl<'a, S: State, T: Throughput<S>> Walk<'a, S, T> {
                 survival *= 1.0 - 2.0 / count as f32;
             }
         }
-        if u >= survival {
+        // What is beyond the range of numbers is so after every loss, too, and would go on to the last scattering.
+        if u >= survival || !throughput.is_finite() {
             return false;
         }
         self.carried.scale(Rgb::splat(1.0 / survival));

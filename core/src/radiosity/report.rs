@@ -1,9 +1,10 @@
 //! How a solution was found.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// How a solution was found.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RadiosityReport {
     /// `radiosity` for equations, `light` for particles from the lights.
     pub method: String,

@@ -85,6 +85,11 @@ impl Environment {
         } else {
             let (width, height) = reader.into_dimensions().map_err(unreadable)?;
             check_size(u64::from(width), u64::from(height))?;
+            // Two bytes stand for a run of 127 at most.
+            if u64::from(width) * u64::from(height) * 4 > 64 * bytes.len() as u64 {
+                let reason = format!("{} bytes cannot hold the {width}x{height} pixels", bytes.len());
+                return Err(EnvironmentError::Unreadable(reason));
+            }
             let image = image::load_from_memory(bytes).map_err(unreadable)?.into_rgb32f();
             (width as usize, height as usize, image.pixels().map(|p| p.0).collect())
         };

@@ -19,6 +19,7 @@ use axum::{
 };
 use ovtigre_core::film::{develop::Develop, size::Size};
 use ovtigre_proto::id::JobId;
+use schemars::JsonSchema;
 use serde::Deserialize;
 use std::sync::Arc;
 
@@ -65,11 +66,16 @@ pub async fn exr(State(farm): State<Arc<Farm>>, Named(name): Named, headers: Hea
 }
 
 /// How the picture is developed.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PngParams {
+    /// `picture`, `error`, a layer's name, or that with `.error` behind it.
     layer: Option<String>,
+    /// Stops: the light is multiplied by 2 to their power.
+    #[schemars(range(min = -64, max = 64))]
     exposure: Option<f32>,
+    /// Columns at most.
+    #[schemars(range(min = 1, max = 32768))]
     width: Option<u32>,
 }
 

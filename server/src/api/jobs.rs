@@ -24,6 +24,7 @@ use ovtigre_proto::{
     route,
     status::{JobState, JobStatus},
 };
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -33,7 +34,7 @@ const TEXT_MAX: usize = 200;
 const NO_CACHE: HeaderValue = HeaderValue::from_static("no-cache");
 
 /// How a job is sent.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CreateParams {
     #[serde(default)]
@@ -41,8 +42,8 @@ pub struct CreateParams {
 }
 
 /// What a job would be.
-#[derive(Debug, Serialize)]
-struct DryRun {
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct DryRun {
     settings: Settings,
     region: Region,
     samples_asked: u32,
@@ -90,12 +91,19 @@ pub async fn create(
 }
 
 /// Which jobs are listed.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ListParams {
+    /// Only those in this state.
     state: Option<JobState>,
+    /// Only those whose name or id has this in it.
+    #[schemars(length(max = 200))]
     text: Option<String>,
+    /// Items at most.
+    #[schemars(range(min = 1, max = 500))]
     limit: Option<u32>,
+    /// `next` of the page before.
+    #[schemars(regex(pattern = r"^[0-9]{1,18}$"))]
     cursor: Option<String>,
 }
 
@@ -139,7 +147,7 @@ pub async fn patch(
 }
 
 /// How a job is deleted.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DeleteParams {
     #[serde(default)]

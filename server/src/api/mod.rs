@@ -10,6 +10,7 @@ pub mod health;
 pub mod image;
 pub mod jobs;
 pub mod leases;
+pub mod openapi;
 pub mod page;
 pub mod params;
 pub mod pixel;
@@ -55,6 +56,8 @@ pub fn router(farm: Arc<Farm>, guarding: Guarding) -> Router {
         .route("/healthz", get(health::alive))
         .route("/readyz", get(health::ready))
         .route("/metrics", get(health::metrics))
+        .route("/openapi.json", get(page::openapi))
+        .route("/docs", get(page::docs))
         .route("/", get(page::index))
         .merge(page::files())
         .fallback(error::no_route)

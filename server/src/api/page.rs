@@ -1,6 +1,6 @@
 //! The page: its files, as they are in the program.
 
-use super::tag;
+use super::{openapi::DOCUMENT, tag};
 use crate::farm::Farm;
 use axum::{
     Router,
@@ -48,13 +48,14 @@ macro_rules! files {
 }
 
 static INDEX: PageFile = PageFile { path: "/", media: HTML, bytes: include_bytes!("../page/index.html") };
-static FILES: [PageFile; 16] = files![
+static FILES: [PageFile; 17] = files![
     "style.css" as STYLE,
     "icon.svg" as DRAWING,
     "app.js" as SCRIPT,
     "blake3.js" as SCRIPT,
     "client.js" as SCRIPT,
     "colours.js" as SCRIPT,
+    "docs.js" as SCRIPT,
     "dom.js" as SCRIPT,
     "files.js" as SCRIPT,
     "format.js" as SCRIPT,
@@ -66,6 +67,19 @@ static FILES: [PageFile; 16] = files![
     "workers.js" as SCRIPT,
     "zip.js" as SCRIPT,
 ];
+
+static DOCS: PageFile = PageFile { path: "/docs", media: HTML, bytes: include_bytes!("../page/docs.html") };
+
+/// The interface as a page.
+pub async fn docs(headers: HeaderMap) -> Response {
+    answer(&DOCS, &headers)
+}
+
+/// The interface as a document.
+pub async fn openapi(headers: HeaderMap) -> Response {
+    let file = PageFile { path: "/openapi.json", media: "application/json", bytes: DOCUMENT.as_bytes() };
+    answer(&file, &headers)
+}
 
 /// The page itself.
 pub async fn index(headers: HeaderMap) -> Response {

@@ -5,6 +5,7 @@ use axum::{
     extract::{FromRequestParts, Path, Query},
     http::{StatusCode, request::Parts},
 };
+use schemars::JsonSchema;
 use serde::{Deserialize, de::DeserializeOwned};
 use std::str::FromStr;
 
@@ -41,12 +42,14 @@ impl<T: DeserializeOwned, S: Send + Sync> FromRequestParts<S> for Params<T> {
 }
 
 /// Where a page of a list begins, and how long it is.
-#[derive(Clone, Debug, Default, Deserialize)]
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PageParams {
     /// Items at most.
+    #[schemars(range(min = 1, max = 500))]
     pub limit: Option<u32>,
     /// `next` of the page before.
+    #[schemars(regex(pattern = r"^[0-9]{1,18}$"))]
     pub cursor: Option<String>,
 }
 

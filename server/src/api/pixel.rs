@@ -7,14 +7,19 @@ use super::{
 use crate::farm::Farm;
 use axum::{Json, extract::State};
 use ovtigre_proto::{id::JobId, pixel::Pixel};
+use schemars::JsonSchema;
 use serde::Deserialize;
 use std::sync::Arc;
 
 /// Which pixel.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PixelParams {
+    /// Column in the frame, from 0.
+    #[schemars(required)]
     x: Option<u32>,
+    /// Row in the frame, from 0.
+    #[schemars(required)]
     y: Option<u32>,
 }
 

@@ -19,7 +19,7 @@ const FILES: Access = Access::Roles(&[Role::Read, Role::Submit, Role::Work]);
 const ADMIN: Access = Access::Roles(&[]);
 
 /// Every door: method, path as the router has it, and who may use it. `HEAD` is as `GET`.
-pub const DOORS: [(Method, &str, Access); 28] = [
+pub const DOORS: [(Method, &str, Access); 31] = [
     (Method::POST, "/v1/scenes", SUBMIT),
     (Method::PUT, "/v1/scenes/{id}", SUBMIT),
     (Method::GET, "/v1/scenes/{id}", FILES),
@@ -35,6 +35,7 @@ pub const DOORS: [(Method, &str, Access); 28] = [
     (Method::GET, "/v1/jobs/{id}/pixel", READ),
     (Method::GET, "/v1/jobs/{id}/error.json", READ),
     (Method::GET, "/v1/jobs/{id}/error.csv", READ),
+    (Method::GET, "/v1/jobs/{id}/error.svg", READ),
     (Method::POST, "/v1/workers", WORK),
     (Method::GET, "/v1/workers", READ),
     (Method::GET, "/v1/workers/{id}", READ),
@@ -47,6 +48,8 @@ pub const DOORS: [(Method, &str, Access); 28] = [
     (Method::GET, "/metrics", READ),
     (Method::GET, "/healthz", Access::Open),
     (Method::GET, "/readyz", Access::Open),
+    (Method::GET, "/openapi.json", Access::Open),
+    (Method::GET, "/docs", Access::Open),
     (Method::GET, "/", Access::Open),
 ];
 

@@ -16,10 +16,12 @@ use axum::{
     http::{Method, Request, Response, StatusCode, header},
 };
 use futures::StreamExt as _;
+use ovtigre_core::film::exr::read_layers;
 use ovtigre_proto::{
     id::JobId,
     job::JobRequest,
     lease::{Committed, ExchangeReply, WorkerJoined},
+    pixel::Pixel,
     problem::Problem,
     status::JobState,
 };
@@ -151,6 +153,9 @@ async fn a_job_is_rendered_over_http_alone() {
     let status = doors.get(&format!("/v1/jobs/{job}")).await.json();
     assert_eq!((status["state"].as_str(), status["samples_done"].as_f64()), (Some("done"), Some(400.0)));
     assert_eq!(doors.get(&image).await.status, StatusCode::OK);
+    let svg = doors.get(&format!("/v1/jobs/{job}/error.svg")).await;
+    assert_eq!((svg.status, svg.head("content-type")), (StatusCode::OK, "image/svg+xml"));
+    assert!(svg.body.starts_with(b"<svg") && svg.body.windows(7).any(|part| part == b"<circle"));
     let csv = String::from_utf8(doors.get(&format!("/v1/jobs/{job}/error.csv")).await.body.to_vec()).unwrap();
     let rows = doors.get(&format!("/v1/jobs/{job}/error.json")).await.json();
     assert_eq!(csv.lines().count(), 1 + rows["rows"].as_array().unwrap().len());
@@ -635,4 +640,83 @@ async fn a_token_has_a_number_of_jobs_and_keys_of_its_own() {
     bench.farm.cancel(&first.id).await.unwrap();
     bench.until_settled(&first.id, JobState::Cancelled).await;
     submit("c", "anna").await.unwrap();
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_pixel_is_that_of_the_picture_while_it_is_made_and_after() {
+    let doors = Doors::open().await;
+    let job = doors.job(4000).await;
+    let path = format!("/v1/jobs/{job}");
+    doors.get(&format!("{path}/pixel?x=0&y=0")).await.problem(404, "no-picture-yet");
+    let worker = doors.bench.worker().await;
+    let leases = doors.bench.take(&worker, 6).await;
+    for lease in &leases {
+        doors.bench.bring(lease, Spread::Noisy).await;
+    }
+    doors.bench.until(&job, |status| status.batches_done == 6).await;
+    for step in ["while it is made", "after"] {
+        if step == "after" {
+            doors.bench.work(&worker, Spread::Noisy).await;
+            doors.bench.until_settled(&job, JobState::Done).await;
+        }
+        let exr = doors.get(&format!("{path}/image.exr")).await;
+        let layers = read_layers(&exr.body).unwrap();
+        for (x, y) in [(0, 0), (17, 9), (39, 29)] {
+            let told = doors.get(&format!("{path}/pixel?x={x}&y={y}")).await;
+            let pixel: Pixel = serde_json::from_slice(&told.body).unwrap();
+            assert_eq!(exr.head("etag"), format!("\"{}\"", pixel.manifest));
+            let [plane] = pixel.planes.as_slice() else { panic!("{} planes", pixel.planes.len()) };
+            assert_eq!(plane.name, "picture");
+            for (c, channel) in ["R", "G", "B"].into_iter().enumerate() {
+                let of = |name: &str| layers.channels[name][y * 40 + x];
+                assert_eq!(plane.value[c], of(channel), "{step} at {x},{y}");
+                assert_eq!(plane.error.unwrap()[c], of(&format!("error.{channel}")), "{step} at {x},{y}");
+            }
+        }
+    }
+    doors.get(&format!("{path}/pixel?x=40&y=0")).await.problem(404, "no-pixel");
+    doors.get(&format!("{path}/pixel?x=0")).await.problem(400, "invalid-parameter");
+    doors.get(&format!("{path}/pixel?x=-1&y=0")).await.problem(400, "invalid-parameter");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_list_that_is_as_before_is_not_sent_again() {
+    let doors = Doors::open().await;
+    let job = doors.job(400).await;
+    let list = async |query: &str, tag: &str| {
+        doors.send(Method::GET, &format!("/v1/jobs{query}"), &[("if-none-match", tag)], "").await
+    };
+    let first = list("", "").await;
+    let tag = first.head("etag").to_owned();
+    assert_eq!((first.status, tag.len()), (StatusCode::OK, 66));
+    let again = list("", &tag).await;
+    assert_eq!((again.status, again.body.len()), (StatusCode::NOT_MODIFIED, 0));
+    doors.bench.farm.cancel(&job).await.unwrap();
+    assert_eq!(list("", &tag).await.status, StatusCode::OK);
+    for (query, found) in
+        [(format!("?text={job}"), 1), ("?text=nothing".to_owned(), 0), ("?text=".to_owned(), 1)]
+    {
+        assert_eq!(list(&query, "").await.json()["items"].as_array().unwrap().len(), found, "{query}");
+    }
+    list(&format!("?text={}", "x".repeat(201)), "").await.problem(400, "invalid-parameter");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_page_runs_nothing_from_elsewhere() {
+    let doors = Doors::open().await;
+    for path in ["/", "/docs", "/page/app.js", "/page/style.css", "/openapi.json"] {
+        let file = doors.get(path).await;
+        assert_eq!(file.status, StatusCode::OK, "{path}");
+        assert!(
+            file.head("content-security-policy").starts_with("default-src 'none'; script-src 'self'"),
+            "{path}"
+        );
+        assert_eq!(file.head("x-content-type-options"), "nosniff");
+        let text = String::from_utf8(file.body.to_vec()).unwrap();
+        let named = text.matches("http://").count() - text.matches("http://www.w3.org/").count();
+        assert_eq!((named, text.matches("innerHTML").count()), (0, 0), "{path}");
+        let again = doors.send(Method::GET, path, &[("if-none-match", file.head("etag"))], "").await;
+        assert_eq!(again.status, StatusCode::NOT_MODIFIED, "{path}");
+    }
+    doors.get("/page/nothing.js").await.problem(404, "not-found");
 }

@@ -115,12 +115,19 @@ pub(crate) fn markdown(entries: &[Entry], threads: usize) -> String {
     entries.iter().map(|entry| table(entry, threads)).collect::<Vec<_>>().join("\n")
 }
 
+fn smallest(entry: &Entry) -> f64 {
+    entry.trials.iter().map(|(_, trial)| trial.last().relative_error).fold(f64::INFINITY, f64::min)
+}
+
 fn table(entry: &Entry, threads: usize) -> String {
     let common = entry.common();
     let number =
         |x: Option<f64>, digits: usize| x.map_or_else(|| "–".to_owned(), |x| format!("{x:.digits$}"));
     let against = entry.reference.as_ref().map_or_else(|| "none".to_owned(), Known::line);
-    let mut text = format!("### {}\n\n{threads} threads. Reference: {against}.\n\n", entry.scene);
+    let near = entry.reference.as_ref().is_some_and(|known| 2.0 * known.own_error > smallest(entry));
+    let near =
+        if near { " It is hardly closer to the truth than what it judges: give it more time." } else { "" };
+    let mut text = format!("### {}\n\n{threads} threads. Reference: {against}.{near}\n\n", entry.scene);
     text += &format!(
         "| method | samples | wall s | worker s | estimated | at most | true | error at {:.1} s | seconds to {:.4} | efficiency | slope |\n",
         common.seconds, common.error

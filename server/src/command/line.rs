@@ -1,10 +1,10 @@
 //! The command line.
 
 use super::{
-    bake, bench, cancel, check, compare, exit::Outcome, fetch, pause, render, resume, serve, status, submit,
-    terminal, token, watch, work, workers,
+    bake, bench, cancel, check, compare, completions, exit::Outcome, fetch, manual, pause, render, resume,
+    serve, status, submit, terminal, token, watch, work, workers,
 };
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory as _, Parser, Subcommand};
 use std::process::ExitCode;
 
 /// A render farm whose pictures come with error bars.
@@ -49,6 +49,10 @@ enum Command {
     Bench(bench::Bench),
     /// Compare two pictures.
     Compare(compare::Compare),
+    /// Print a script that lets a shell complete commands and flags.
+    Completions(completions::Completions),
+    /// Write pages for `man`, one a command.
+    Manual(manual::Manual),
 }
 
 impl Line {
@@ -93,6 +97,8 @@ impl Command {
             Self::Bake(command) => command.run().await?,
             Self::Bench(command) => command.run().await?,
             Self::Compare(command) => return command.run(),
+            Self::Completions(command) => command.run(Line::command()),
+            Self::Manual(command) => command.run(Line::command())?,
         }
         Ok(ExitCode::SUCCESS)
     }
@@ -101,7 +107,6 @@ impl Command {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::CommandFactory as _;
 
     #[test]
     fn flags_do_not_contradict_each_other() {

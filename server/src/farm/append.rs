@@ -163,7 +163,7 @@ impl Merge {
     }
 
     /// Adds a sum to its lane.
-    fn append(&mut self, row: &CommitRow, sum: &Sum) -> Result<()> {
+    pub(super) fn append(&mut self, row: &CommitRow, sum: &Sum) -> Result<()> {
         let Lane { replicate, region } = row.batch.lane();
         let prefix = &mut self.prefixes[region as usize][replicate as usize];
         prefix.append(sum).map_err(|e| FarmError::Damaged(e.to_string()))?;
@@ -212,7 +212,7 @@ impl Merge {
     }
 
     /// Lanes with so many partials since their last blob of sums, and that number of blocks.
-    fn overdue(&self, partials: u32) -> Vec<(Lane, u32)> {
+    pub(super) fn overdue(&self, partials: u32) -> Vec<(Lane, u32)> {
         let since = |lane: &Lane| self.snapshots.get(lane).copied().unwrap_or(0);
         lanes(&self.schedule)
             .filter(|lane| {

@@ -16,6 +16,7 @@ pub mod join;
 pub mod lease;
 pub mod live;
 pub mod mandates;
+pub mod needs;
 pub mod open;
 pub mod others;
 pub mod parts;

@@ -9,7 +9,7 @@ use ovtigre_core::{
     path::reach::Unreachable,
     settings::{CameraChoice, FULL, Gloss, Method, Settings, Shadows, Shutter, Weights},
 };
-use ovtigre_proto::{id::BlobId, job::JobRequest};
+use ovtigre_proto::{id::BlobId, job::JobRequest, needs::Needs};
 use serde::{Deserialize, Deserializer, Serialize, de::Error as _};
 use serde_json::Value;
 
@@ -38,6 +38,9 @@ pub struct JobSpec {
     /// The brightest that a sample can be which meets a light by chance only.
     #[serde(default)]
     pub by_chance: Option<f64>,
+    /// What it needs, and what it leaves out.
+    #[serde(default)]
+    pub needs: Needs,
     /// Why the method was chosen.
     pub method_reason: String,
     /// Paths that are asked for and that no technique of the method makes.

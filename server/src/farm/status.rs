@@ -85,6 +85,7 @@ impl Farm {
             class: row.class.clone(),
             paths: shown(&spec.settings.paths).to_owned(),
             unreachable: spec.unreachable,
+            needs: spec.needs,
             radiosity,
             layers,
             settings: spec.settings,

@@ -3,6 +3,7 @@
 use super::{
     Farm,
     error::{FarmError, Result, fault},
+    needs::needs,
     paths::choose,
     reach::{DEFAULT_SKY, letters, line, missing},
     rules::{PARTIAL_BYTES_MAX, Rules},
@@ -13,13 +14,16 @@ use crate::{
     store::row::{Added, IdempotencyKey, NewJob},
 };
 use ovtigre_core::{
+    bsdf::event::Letters,
     film::size::{Region, Size},
+    path::expression::language::Language,
     render::inspect::by_chance,
     settings::{CameraChoice, Environment, EnvironmentSource, Lens, Settings, Shutter},
 };
 use ovtigre_proto::{
     id::BlobId,
     job::{JobRequest, REPLICATES_DEFAULT, SAMPLES_DEFAULT, WIDTH_DEFAULT},
+    needs::Needs,
     pair::EnvironmentRequest,
     problem::Fault,
     scene::{SceneContent, SceneContents, SceneReport},
@@ -200,12 +204,13 @@ pub fn resolve(
         return Err(faults);
     }
     let lit = if request.environment.is_some() { Lit::ByRequest } else { Lit::ByScene };
+    let words = language.as_ref().map_or(Letters::NONE, Language::letters);
     let unreachable = language
         .map(|language| missing(&language, chosen.method, &request, scene, camera, lens))
         .unwrap_or_default();
     let mut warnings = warnings(scene, lit, camera, samples, replicates);
     warnings.extend(unreachable.iter().map(line));
-    let spec = JobSpec {
+    let mut spec = JobSpec {
         settings: Settings {
             size,
             camera,
@@ -231,11 +236,13 @@ pub fn resolve(
         build: rules.build.to_owned(),
         owner: None,
         by_chance: by_chance(chosen.method, letters(scene), scene.brightest),
+        needs: Needs::default(),
         method_reason: chosen.reason.to_owned(),
         unreachable,
         warnings,
         request,
     };
+    spec.needs = needs(scene, &spec.settings, words);
     fits(&spec, rules).map(|()| spec)
 }
 

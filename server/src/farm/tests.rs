@@ -8,6 +8,7 @@ mod layers;
 mod merging;
 mod replicas;
 mod sharing;
+mod simulation;
 mod space;
 mod submitting;
 mod trust;

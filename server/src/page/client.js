@@ -108,18 +108,18 @@ async function* read(body) {
   }
 }
 
-/** Uploads bytes; `progress` is told the part that is sent. */
-export function upload(path, blob, progress, signal) {
+/** One PUT of bytes whose progress is told; the status and what was answered. */
+function putBytes(path, blob, headers, progress, signal) {
   return new Promise((resolve, reject) => {
     const request = new XMLHttpRequest();
     request.open('PUT', path);
-    for (const [name, value] of Object.entries(heads({ 'content-type': 'application/octet-stream' }))) {
+    for (const [name, value] of Object.entries(heads({ 'content-type': 'application/octet-stream', ...headers }))) {
       request.setRequestHeader(name, value);
     }
     request.responseType = 'json';
-    request.upload.onprogress = (event) => event.lengthComputable && progress(event.loaded / event.total);
+    request.upload.onprogress = (event) => progress(event.loaded);
     request.onload = () => {
-      if (request.status < 300) resolve(request.response);
+      if (request.status < 300) resolve({ status: request.status, answer: request.response });
       else reject(new Problem({ title: `the farm answered ${request.status}`, status: request.status, ...request.response }));
     };
     request.onerror = () => reject(new Problem({ title: 'the upload was cut off', status: 0 }));
@@ -127,6 +127,33 @@ export function upload(path, blob, progress, signal) {
     signal?.addEventListener('abort', () => request.abort(), { once: true });
     request.send(blob);
   });
+}
+
+// Larger files go in parts of this size, so that one that is cut off goes on where it was.
+const PART = 8 << 20;
+const TRIES = 6;
+
+/** Uploads bytes under their hash; `progress` is told the part that is there. */
+export async function upload(path, blob, progress, signal, size = PART) {
+  if (blob.size <= size) return (await putBytes(path, blob, {}, (sent) => progress(sent / blob.size), signal)).answer;
+  let at = null;
+  for (let failures = 0; ;) {
+    try {
+      const end = at === null ? 0 : Math.min(at + size, blob.size);
+      const range = at === null ? `bytes */${blob.size}` : `bytes ${at}-${end - 1}/${blob.size}`;
+      const { status, answer } = await putBytes(path, blob.slice(at ?? 0, end), { 'content-range': range }, (sent) => progress(((at ?? 0) + sent) / blob.size), signal);
+      if (status !== 202) return answer;
+      at = answer.received;
+      failures = 0;
+      // All is there, and somebody else's part was the last.
+      if (at >= blob.size) return await get(path, { signal });
+    } catch (error) {
+      failures += 1;
+      if (error.status !== 0 || failures >= TRIES) throw error;
+      await new Promise((resolve) => setTimeout(resolve, 500 * 2 ** failures));
+      at = null;
+    }
+  }
 }
 
 /** Saves a blob as a file of the user's. */

@@ -132,8 +132,8 @@ class JobView {
     const { job } = this;
     const error = errorOf(job);
     const one = (title, value, under, kind) => el('div', { class: kind ?? null }, el('dt', {}, title), el('dd', {}, value, under ? el('span', { class: 'under' }, under) : null));
-    const target = job.error_target ? `${job.certified ? 'certified' : 'target'} ≤ ${percent(job.error_target)}` : null;
-    const upper = error?.upper ? `at most ${error.upper}` : null;
+    const target = job.error_target ? `${job.certified ? 'certified' : 'target'} ≤\u00a0${percent(job.error_target)}` : null;
+    const upper = job.error?.doubt ? 'not certified' : error?.upper ? `at most ${error.upper}` : null;
     const rays = job.worker_seconds > 0 ? `${short(job.rays / job.worker_seconds)} rays/s a worker` : null;
     fill(this.numbers,
       one('Error', error?.now ?? '–', [upper, target].filter(Boolean).join(' · '), job.certified ? 'good' : null),
@@ -170,10 +170,11 @@ class JobView {
 
   #fillWhy(first) {
     const { job } = this;
-    const key = JSON.stringify([job.method_reason, job.unreachable, job.warnings, job.radiosity?.certified, job.radiosity?.iterations?.length]);
+    const key = JSON.stringify([job.error?.doubt, job.method_reason, job.unreachable, job.warnings, job.radiosity?.certified, job.radiosity?.iterations?.length]);
     if (!first && key === this.whyKey) return;
     this.whyKey = key;
     const lists = [];
+    if (job.error?.doubt) lists.push(el('h3', {}, 'Why the error is not certified'), el('p', {}, doubted(job.error.doubt)));
     if (job.unreachable.length > 0) lists.push(el('h3', {}, 'Paths that no technique of this method makes'), el('ul', {}, job.unreachable.map((one) => el('li', {}, said(one)))));
     if (job.warnings.length > 0) lists.push(el('h3', {}, 'Of the scene'), el('ul', {}, job.warnings.map((warning) => el('li', {}, warning))));
     if (job.radiosity) lists.push(el('h3', {}, 'The solution'), el('pre', { tabindex: 0, role: 'region', 'aria-label': 'How radiosity was solved' }, JSON.stringify(job.radiosity, null, 1)));
@@ -279,6 +280,16 @@ class JobView {
 
 function checkpointLine(row) {
   return `Checkpoint at ${count(row.samples)} samples${row.relative_error === null ? '' : `: error ${percent(row.relative_error)}`}.`;
+}
+
+/** Why an error may not be believed, and where in the picture. */
+function doubted({ cause, effective_pixels: pixels, lone_share: lone, pixels: worst }) {
+  const why = {
+    few_pixels: `the error is as good as in ${digits(pixels, 2)} pixels`,
+    lone_samples: `${percent(lone)} of the error is of light that one replicate found alone`,
+  }[cause] ?? String(cause).replaceAll('_', ' ');
+  const where = worst?.length > 0 ? `; most of it at ${worst.slice(0, 3).map(({ x, y }) => `${x},${y}`).join(' · ')}` : '';
+  return `${why[0].toUpperCase()}${why.slice(1)}${where}.`;
 }
 
 /** What is not made, in a line. */

@@ -123,12 +123,12 @@ class Row {
     if (this.shown !== job.state) fill(this.state, badge(job.state));
     this.shown = job.state;
     this.bar.value = part(job);
-    text(this.done, `${samples(job.samples_done)} of ${samples(job.samples_asked)} samples`);
+    text(this.done, job.state === 'done' ? `${samples(job.samples_done)} samples` : `${samples(job.samples_done)} of ${samples(job.samples_asked)} samples`);
     const error = errorOf(job);
     text(this.error, error ? `${error.now}` : '–');
     this.error.title = error?.upper ? `at most ${error.upper} with 95 % confidence` : '';
     const target = job.error_target;
-    text(this.target, target ? `${job.certified ? 'certified' : 'target'} ≤ ${percent(target)}` : error?.upper ? `≤ ${error.upper}` : '');
+    text(this.target, target ? `${job.certified ? 'certified' : 'target'} ≤\u00a0${percent(target)}` : error?.upper ? `≤\u00a0${error.upper}` : '');
     const running = job.state === 'running';
     text(this.time, running && job.eta_seconds !== undefined ? `${seconds(job.eta_seconds)} left` : job.started_at ? seconds(job.wall_seconds) : '–');
     text(this.ran, running && job.eta_seconds !== undefined ? `after ${seconds(job.wall_seconds)}` : '');

@@ -1,10 +1,19 @@
-//! Measures how often the certified error holds, and prints the tables of docs/ERROR.md:
+//! Measures how often the certified error holds, and prints the tables of docs/ERROR.md, case by case:
 //! `cargo run --release -p ovtigre-tests --bin calibration -- [--runs N] [--side N] [--looks N] [--replicates N] [--reference N]
 //! [--seed N] [--threads N] [--case NAME]`.
 
 use anyhow::{Context as _, bail};
 use ovtigre_tests::calibration::{Plan, calibrate, cases};
 use std::io::Write as _;
+
+const COVERAGE: &str = "\
+| case | samples | true error | relative error | at most | doubted | certified too low | of all | claimed, at most | covered, the doubted too |
+| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |
+";
+const STOPS: &str = "\
+| case | target | stopped | above the target | of all |
+| --- | ---: | ---: | ---: | ---: |
+";
 
 fn main() -> anyhow::Result<()> {
     let mut plan = Plan { runs: 200, side: 32, looks: 7, replicates: 4, reference: 100, seed: 0 };
@@ -26,22 +35,13 @@ fn main() -> anyhow::Result<()> {
         }
     }
     rayon::ThreadPoolBuilder::new().num_threads(threads).build_global()?;
-    let (mut coverage, mut stops) = (String::new(), String::new());
-    let mut err = std::io::stderr().lock();
+    let (mut out, mut err) = (std::io::stdout().lock(), std::io::stderr().lock());
     for case in cases().iter().filter(|case| only.as_deref().is_none_or(|name| name == case.name)) {
         let found = calibrate(case, plan);
         writeln!(err, "{}: the reference is known to {:.5}", case.name, found.own)?;
-        let [more, stopped] = found.tables(case);
-        coverage += &more;
-        stops += &stopped;
+        let [coverage, stops] = found.tables(case);
+        writeln!(out, "{COVERAGE}{coverage}\n{STOPS}{stops}")?;
+        out.flush()?;
     }
-    let mut out = std::io::stdout().lock();
-    let head = "| case | samples | true error | relative error | at most | doubted | certified too low | of all | claimed, at most | covered, the doubted too |";
-    writeln!(
-        out,
-        "{head}\n| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n{coverage}"
-    )?;
-    let head = "| case | target | stopped | above the target | of all |";
-    writeln!(out, "{head}\n| --- | ---: | ---: | ---: | ---: |\n{stops}")?;
     Ok(())
 }

@@ -56,7 +56,9 @@ fn main() -> anyhow::Result<()> {
     let wishes = wishes()?;
     let cases: Vec<Case> = cases().into_iter().filter(|case| case.name.contains(&wishes.only)).collect();
     if wishes.lists {
-        cases.iter().for_each(|case| println!("{}: {}: {:?}", case.group, case.name, case.trials));
+        for case in &cases {
+            println!("{}: {}: {:?}", case.group, case.name, case.trials);
+        }
         return Ok(());
     }
     let rows = look(&cases, &wishes);
@@ -68,7 +70,7 @@ fn main() -> anyhow::Result<()> {
     let text = page(&rows, &head);
     match &wishes.output {
         Some(file) => {
-            fs::write(file, text).with_context(|| format!("{} cannot be written", file.display()))?
+            fs::write(file, text).with_context(|| format!("{} cannot be written", file.display()))?;
         }
         None => println!("{text}"),
     }

@@ -16,9 +16,12 @@ type Body = (Vec<Vec3>, Vec<[u32; 3]>);
 /// Rays of each trial at the full budget: ten million of all together.
 const RAYS: u64 = 850_000;
 
+/// A name and what makes it.
+type Shape = (&'static str, fn() -> Body);
+
 /// The only one.
 pub fn cases() -> Vec<Case> {
-    let bodies: [(&str, fn() -> Body); 3] = [
+    let bodies: [Shape; 3] = [
         ("cube", || cuboid(Vec3::splat(-1.0), Vec3::ONE)),
         ("sphere of 4,512 triangles", || sphere(Vec3::ZERO, 1.0, 48)),
         ("box of slivers", strips),

@@ -70,7 +70,7 @@ impl Finding {
     /// How far off it is, relative to what was expected; of a bound, what was found.
     pub fn off(&self) -> f64 {
         match self.answer {
-            Answer::Estimate { expected, got, .. } if expected == 0.0 => got,
+            Answer::Estimate { expected: 0.0, got, .. } => got,
             Answer::Estimate { expected, got, .. } => got / expected - 1.0,
             Answer::Bound { got, .. } => got,
         }
@@ -86,14 +86,13 @@ impl Finding {
             Answer::Bound { .. } => Verdict::Fails,
             Answer::Estimate { expected, got, error } => {
                 let found = if error == 0.0 { 0.0 } else { FOUND * error / expected.abs() };
-                if !((got - expected).abs() <= ERRORS * error + ROUNDING * expected.abs()) {
-                    Verdict::Fails
-                } else if found <= BIAS {
-                    Verdict::Holds
-                } else if found <= LEAST {
-                    Verdict::HoldsWithin(found)
-                } else {
-                    Verdict::Unsure
+                // What is no number is not within anything.
+                let is_within = (got - expected).abs() <= ERRORS * error + ROUNDING * expected.abs();
+                match found {
+                    _ if !is_within => Verdict::Fails,
+                    f if f <= BIAS => Verdict::Holds,
+                    f if f <= LEAST => Verdict::HoldsWithin(f),
+                    _ => Verdict::Unsure,
                 }
             }
         }

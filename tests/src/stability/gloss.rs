@@ -33,8 +33,11 @@ fn textbook(alpha: f64, w: DVec3) -> (f64, f64) {
     (density, ((1.0 + alpha * alpha * tan2).sqrt() - 1.0) / 2.0)
 }
 
+/// A name, and by how much it is off.
+type Comparison = (&'static str, fn(Ggx, Vec3, Vec3) -> f64);
+
 fn values() -> Case {
-    let what: [(&str, fn(Ggx, Vec3, Vec3) -> f64); 4] =
+    let what: [Comparison; 4] =
         [("D", off_density), ("Λ", off_lambda), ("f · cos θ", off_value), ("density of sampling", off_pdf)];
     let mut trials = Vec::new();
     for alpha in ALPHAS {

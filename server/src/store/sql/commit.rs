@@ -19,22 +19,26 @@ use std::ops::Range;
 /// Records a batch's sum if there is none; otherwise compares.
 pub(super) async fn commit(db: &mut Db, new: NewCommit) -> Result<CommitOutcome> {
     let NewCommit { job, row: CommitRow { batch, hash, worker_micros }, worker, rays_per_second } = new;
-    let state = query("SELECT state, brought FROM job WHERE id = $1").bind(job.as_str());
+    let state = query(
+        "SELECT state, brought,
+           (SELECT next_block FROM cursor WHERE job = $1 AND region = $2 AND replicate = $3) AS next_block,
+           (SELECT worker FROM lease WHERE job = $1 AND region = $2 AND replicate = $3 AND block = $4) AS holder,
+           (SELECT count(*) FROM returned WHERE job = $1 AND region = $2 AND replicate = $3 AND block = $4) AS returned,
+           (SELECT count(*) FROM failure WHERE job = $1 AND region = $2 AND replicate = $3 AND block = $4) AS failed
+         FROM job WHERE id = $1",
+    );
+    let state = state.bind(job.as_str()).bind(batch.region).bind(batch.replicate).bind(batch.block);
     let Some(row) = db.first(state).await? else { return Ok(CommitOutcome::NoJob) };
     if job_state(&row.text("state")?)?.is_over() {
         return Ok(CommitOutcome::JobOver);
     }
     let number = row.whole("brought")? + 1;
-    let next = "SELECT next_block FROM cursor WHERE job = $1 AND region = $2 AND replicate = $3";
-    let next = query(next).bind(job.as_str()).bind(batch.region).bind(batch.replicate);
-    let next = db.first(next).await?.map(|row| row.whole("next_block")).transpose()?;
+    let next = row.whole_or_none("next_block")?;
     if next.is_none_or(|next| next <= i64::from(batch.block)) {
         return Ok(CommitOutcome::NeverHandedOut);
     }
-    let who = match &worker {
-        Some(worker) => worker.to_string(),
-        None => holder(db, &job, batch).await?,
-    };
+    let holder = row.text_or_none("holder")?;
+    let who = worker.map(|worker| worker.to_string()).or_else(|| holder.clone()).unwrap_or_default();
     let now = db.now().await?;
     let insert = query(
         "INSERT INTO commits (job, region, replicate, block, hash, worker, worker_micros, committed_ms, number)
@@ -45,11 +49,23 @@ pub(super) async fn commit(db: &mut Db, new: NewCommit) -> Result<CommitOutcome>
     if db.execute(insert).await? == 0 {
         return compare(db, &job, batch, &hash, &who, now).await;
     }
-    for sql in [
-        "DELETE FROM lease WHERE job = $1 AND region = $2 AND replicate = $3 AND block = $4",
-        "DELETE FROM returned WHERE job = $1 AND region = $2 AND replicate = $3 AND block = $4",
-        "DELETE FROM failure WHERE job = $1 AND region = $2 AND replicate = $3 AND block = $4",
+    for (there, sql) in [
+        (
+            holder.is_some(),
+            "DELETE FROM lease WHERE job = $1 AND region = $2 AND replicate = $3 AND block = $4",
+        ),
+        (
+            row.truth("returned")?,
+            "DELETE FROM returned WHERE job = $1 AND region = $2 AND replicate = $3 AND block = $4",
+        ),
+        (
+            row.truth("failed")?,
+            "DELETE FROM failure WHERE job = $1 AND region = $2 AND replicate = $3 AND block = $4",
+        ),
     ] {
+        if !there {
+            continue;
+        }
         let delete = query(sql).bind(job.as_str());
         db.execute(delete.bind(batch.region).bind(batch.replicate).bind(batch.block)).await?;
     }
@@ -58,13 +74,6 @@ pub(super) async fn commit(db: &mut Db, new: NewCommit) -> Result<CommitOutcome>
     let done = "UPDATE worker SET batches_done = batches_done + 1, rays_per_second = $2 WHERE id = $1";
     db.execute(query(done).bind(who).bind(rays_per_second)).await?;
     Ok(CommitOutcome::First)
-}
-
-/// Who holds a batch; nothing where nobody does.
-async fn holder(db: &mut Db, job: &JobId, batch: BatchKey) -> Result<String> {
-    let of = "SELECT worker FROM lease WHERE job = $1 AND region = $2 AND replicate = $3 AND block = $4";
-    let of = query(of).bind(job.as_str()).bind(batch.region).bind(batch.replicate).bind(batch.block);
-    db.first(of).await?.map_or_else(|| Ok(String::new()), |row| row.text("worker"))
 }
 
 async fn compare(

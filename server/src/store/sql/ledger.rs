@@ -64,15 +64,22 @@ pub(super) async fn claim(db: &mut Db, claims: Vec<Claim>, time: Duration) -> Re
 
 async fn claim_one(db: &mut Db, claim: &Claim, now: i64, time: i64) -> Result<bool> {
     let Claim { lease, job, batch: BatchKey { block, replicate, region }, worker } = claim;
-    let state = db.first(query("SELECT state FROM job WHERE id = $1").bind(job.as_str())).await?;
-    let state = state.map(|row| row.text("state")).transpose()?;
-    if !matches!(state.as_deref(), Some("queued" | "running")) {
+    let state = query(
+        "SELECT state,
+           (SELECT count(*) FROM returned WHERE job = $1 AND region = $2 AND replicate = $3 AND block = $4) AS returned
+         FROM job WHERE id = $1",
+    );
+    let state = state.bind(job.as_str()).bind(*region).bind(*replicate).bind(*block);
+    let Some(row) = db.first(state).await? else { return Ok(false) };
+    let state = row.text("state")?;
+    if !matches!(&*state, "queued" | "running") {
         return Ok(false);
     }
-    let returned =
-        query("DELETE FROM returned WHERE job = $1 AND region = $2 AND replicate = $3 AND block = $4");
-    let returned = returned.bind(job.as_str()).bind(*region).bind(*replicate).bind(*block);
-    if db.execute(returned).await? == 0 {
+    if row.truth("returned")? {
+        let returned =
+            query("DELETE FROM returned WHERE job = $1 AND region = $2 AND replicate = $3 AND block = $4");
+        db.execute(returned.bind(job.as_str()).bind(*region).bind(*replicate).bind(*block)).await?;
+    } else {
         let next = query(
             "UPDATE cursor SET next_block = next_block + 1
              WHERE job = $1 AND region = $2 AND replicate = $3 AND next_block = $4",
@@ -88,7 +95,7 @@ async fn claim_one(db: &mut Db, claim: &Claim, now: i64, time: i64) -> Result<bo
     );
     let insert = insert.bind(lease.as_str()).bind(job.as_str()).bind(*region).bind(*replicate).bind(*block);
     db.execute(insert.bind(worker.as_str()).bind(now).bind(now + time)).await?;
-    if state.as_deref() == Some("queued") {
+    if state == "queued" {
         let begun = query(
             "UPDATE job SET state = 'running', version = version + 1, started_ms = coalesce(started_ms, $2)
              WHERE id = $1",

@@ -1,6 +1,6 @@
 //! Where a database is, and how it is opened.
 
-use super::connection::Db;
+use super::connection::{Db, To};
 use crate::store::error::{Result, StoreError};
 use sqlx::{
     ConnectOptions as _, PgPool, SqlitePool,
@@ -73,18 +73,18 @@ impl Source {
     /// A connection to write over.
     pub(super) async fn connect(&self) -> Result<Db> {
         Ok(match self {
-            Self::File(options) => Db::Sqlite(options.connect().await?),
-            Self::Server(options) => Db::Postgres(options.connect().await?),
+            Self::File(options) => Db::new(To::Sqlite(options.connect().await?)),
+            Self::Server(options) => Db::new(To::Postgres(options.connect().await?)),
         })
     }
 
     /// A connection to write over, once the tables are up to date.
     pub(super) async fn prepare(&self) -> Result<Db> {
         let mut db = self.connect().await?;
-        let migrated = match &mut db {
-            Db::Sqlite(connection) => SQLITE.run(connection).await,
-            Db::Postgres(connection) => POSTGRES.run(connection).await,
-            Db::SqliteReader(_) | Db::PostgresReader(_) => Ok(()),
+        let migrated = match &mut db.to {
+            To::Sqlite(connection) => SQLITE.run(connection).await,
+            To::Postgres(connection) => POSTGRES.run(connection).await,
+            To::SqliteReader(_) | To::PostgresReader(_) => Ok(()),
         };
         match migrated {
             Ok(()) => Ok(db),
@@ -113,10 +113,10 @@ impl Readers {
     /// One of them.
     pub(super) async fn one(&self) -> Result<Db> {
         let reader = match self {
-            Self::File(pool) => pool.acquire().await.map(Db::SqliteReader),
-            Self::Server(pool) => pool.acquire().await.map(Db::PostgresReader),
+            Self::File(pool) => pool.acquire().await.map(To::SqliteReader),
+            Self::Server(pool) => pool.acquire().await.map(To::PostgresReader),
         };
-        reader.map_err(|error| match error {
+        reader.map(Db::new).map_err(|error| match error {
             sqlx::Error::PoolClosed => StoreError::Closed,
             other => other.into(),
         })

@@ -1,6 +1,6 @@
 //! A place of its own on a PostgreSQL server, for a test.
 
-use super::{connection::Db, open::Source};
+use super::{connection::To, open::Source};
 
 /// A PostgreSQL server to test with.
 const SERVER: &str = "OVTIGRE_TEST_POSTGRES";
@@ -13,7 +13,7 @@ pub(crate) async fn schema(name: &str) -> Option<String> {
     };
     let name = format!("test_{}_{name}", std::process::id());
     let mut db = Source::server(&server).unwrap().connect().await.unwrap();
-    let Db::Postgres(connection) = &mut db else { unreachable!("an address of PostgreSQL") };
+    let To::Postgres(connection) = &mut db.to else { unreachable!("an address of PostgreSQL") };
     let create = sqlx::AssertSqlSafe(format!("CREATE SCHEMA {name}"));
     sqlx::query(create).execute(connection).await.unwrap();
     let mark = if server.contains('?') { '&' } else { '?' };

@@ -125,6 +125,13 @@ enum Health {
     Doubtful,
 }
 
+/// Whether a change before this one can still be taken back alone.
+#[derive(Clone, Copy)]
+enum Savepoint {
+    None,
+    Open,
+}
+
 /// One transaction; a change that fails is taken back alone, by its savepoint.
 async fn write_group(connection: &mut Db, group: Vec<Change>) -> Health {
     let mut tells: Vec<Tell> = Vec::with_capacity(group.len());
@@ -135,26 +142,28 @@ async fn write_group(connection: &mut Db, group: Vec<Change>) -> Health {
         let _ = connection.execute(query("ROLLBACK")).await;
         return Health::Doubtful;
     }
+    let mut before = Savepoint::None;
     for change in group {
         if written.is_err() {
             continue;
         }
-        written = run(connection, "SAVEPOINT change").await;
+        // One way to the database and back is what such a statement costs.
+        written = match std::mem::replace(&mut before, Savepoint::Open) {
+            Savepoint::None => connection.run("SAVEPOINT change").await,
+            Savepoint::Open => connection.run("RELEASE SAVEPOINT change; SAVEPOINT change").await,
+        };
         if written.is_err() {
             continue;
         }
         let (keep, tell) = change(connection).await;
         tells.push(tell);
         if keep == Keep::No {
-            written = run(connection, "ROLLBACK TO SAVEPOINT change").await;
-        }
-        if written.is_ok() {
-            written = run(connection, "RELEASE SAVEPOINT change").await;
+            written = connection.run("ROLLBACK TO SAVEPOINT change").await;
         }
     }
     if written.is_ok() {
         FailPoint::GroupBeforeCommit.pass();
-        written = run(connection, "COMMIT").await;
+        written = connection.run("COMMIT").await;
         FailPoint::GroupAfterCommit.pass();
     }
     if let Err(error) = &written {
@@ -166,8 +175,4 @@ async fn write_group(connection: &mut Db, group: Vec<Change>) -> Health {
         tell(written.as_ref().map_or_else(|error| Err(StoreError::Commit(error.to_string())), |()| Ok(())));
     }
     if written.is_ok() { Health::Good } else { Health::Doubtful }
-}
-
-async fn run(connection: &mut Db, sql: &'static str) -> Result<()> {
-    connection.execute(query(sql)).await.map(drop)
 }

@@ -1,0 +1,48 @@
+//! Sends changed bytes to everything that reads bytes from outside:
+//! `cargo run -p ovtigre-tests --bin torment -- [SECONDS [SEED]]`, 60 seconds for each reader and seed 1 where nothing is said.
+//! What a reader does not bear is written to `tests/hostile`, where the tests find it again.
+
+#![expect(clippy::print_stdout, reason = "a program of the command line")]
+
+use ovtigre_tests::hostile::{Target, peak_bytes, torment};
+use std::{
+    fs,
+    path::Path,
+    time::{Duration, Instant},
+};
+
+fn main() -> anyhow::Result<()> {
+    let numbers: Vec<u64> = std::env::args().filter_map(|a| a.parse().ok()).collect();
+    let (seconds, seed) = (numbers.first().copied().unwrap_or(60), numbers.get(1).copied().unwrap_or(1));
+    // Panics are told of with the bytes that brought them about; some decoders' are caught on purpose.
+    std::panic::set_hook(Box::new(|_| ()));
+    let mut found = 0;
+    for target in Target::ALL {
+        let begun = Instant::now();
+        let mut count = 0;
+        let mut next = seed;
+        while begun.elapsed() < Duration::from_secs(seconds) {
+            let over = |n: u64| !n.is_multiple_of(16) || begun.elapsed() < Duration::from_secs(seconds);
+            match torment(target, next, over) {
+                Ok(borne) => count += borne,
+                Err(stumbled) => {
+                    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("hostile");
+                    fs::create_dir_all(&folder)?;
+                    let name = blake3::hash(&stumbled.bytes).to_hex();
+                    let file = folder.join(format!("{target:?}-{}", &name.as_str()[..12]));
+                    fs::write(&file, &stumbled.bytes)?;
+                    println!("{target:?}: {}: {}", stumbled.how, file.display());
+                    found += 1;
+                }
+            }
+            next = next.wrapping_add(1 << 32);
+        }
+        let peak = peak_bytes().unwrap_or_default() >> 20;
+        println!(
+            "{target:?}: {count} inputs in {:.0} s, memory at most {peak} MiB",
+            begun.elapsed().as_secs_f64()
+        );
+    }
+    anyhow::ensure!(found == 0, "{found} inputs were not borne");
+    Ok(())
+}
