@@ -46,8 +46,11 @@ impl Mutator {
         Self { corpus: scenes(), seed }
     }
 
-    /// File `number`.
+    /// File `number`; the first are the scenes of the corpus as they are.
     pub fn file(&self, number: u64) -> Vec<u8> {
+        if let Some(piece) = self.corpus.get(number as usize) {
+            return glb(piece.json.to_string().as_bytes(), &piece.binary);
+        }
         let mut random = Random::new(self.seed.wrapping_mul(0x2545_f491_4f6c_dd1d) ^ number);
         let mut piece = self.corpus[random.below(self.corpus.len())].clone();
         let other = &self.corpus[random.below(self.corpus.len())];
@@ -65,7 +68,7 @@ impl Mutator {
                 return glb(&text, &piece.binary);
             }
             kind => {
-                for _ in 0..1 + random.below(4) {
+                for _ in 0..1 + random.below(2) {
                     change_value(&mut piece.json, &other.json, &mut random);
                 }
                 if kind == 7 {
@@ -135,10 +138,11 @@ fn change_value(document: &mut Value, other: &Value, random: &mut Random) {
             [json!(null), json!([]), json!({}), json!(""), json!(true), json!("\u{0}é")][random.below(6)]
                 .clone(),
         ),
-        4 => Some((0..random.below(2000)).fold(json!(0), |inner, _| json!([inner]))),
+        4 => Some((0..random.below(300)).fold(json!(0), |inner, _| Value::Array(vec![inner]))),
         _ => Some(odd_number(random)),
     };
-    replace(document, &mut random.below(place), new);
+    let mut new = Some(new);
+    replace(document, &mut random.below(place), &mut new);
 }
 
 /// Numbers at which readers of documents stumble.
@@ -193,40 +197,44 @@ fn pick<'a>(value: &'a Value, random: &mut Random) -> &'a Value {
     here
 }
 
-/// Gives value number `left` of a document, in the order of reading, another, or takes it away.
-fn replace(value: &mut Value, left: &mut usize, new: Option<Value>) -> bool {
+/// Gives value number `left` of a document, in the order of reading, another, or takes it away (`Some(None)`).
+fn replace(value: &mut Value, left: &mut usize, new: &mut Option<Option<Value>>) {
     if *left == 0 {
-        *value = new.unwrap_or(Value::Null);
-        return true;
+        *value = new.take().flatten().unwrap_or(Value::Null);
+        return;
     }
     *left -= 1;
     match value {
         Value::Array(list) => {
             for i in 0..list.len() {
-                if *left == 0 && new.is_none() {
+                if *left == 0 && *new == Some(None) {
                     list.remove(i);
-                    return true;
+                    *new = None;
+                } else if new.is_some() {
+                    replace(&mut list[i], left, new);
                 }
-                if replace(&mut list[i], left, new.clone()) {
-                    return true;
+                if new.is_none() {
+                    return;
                 }
             }
         }
         Value::Object(map) => {
-            let keys: Vec<String> = map.keys().cloned().collect();
-            for key in keys {
-                if *left == 0 && new.is_none() {
-                    map.remove(&key);
-                    return true;
+            let mut gone = None;
+            for (key, value) in map.iter_mut() {
+                if *left == 0 && *new == Some(None) {
+                    gone = Some(key.clone());
+                    *new = None;
+                } else if new.is_some() {
+                    replace(value, left, new);
                 }
-                if map.get_mut(&key).is_some_and(|value| replace(value, left, new.clone())) {
-                    return true;
+                if new.is_none() {
+                    break;
                 }
             }
+            gone.map(|key| map.remove(&key));
         }
         _ => {}
     }
-    false
 }
 
 /// Reads a file, and renders 4 × 4 pixels of what it holds, on a thread of its own. One that hangs is left behind.

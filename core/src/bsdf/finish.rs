@@ -5,14 +5,15 @@
 //! (an interface of reflectance 1 loses up to half at strength 1). Under a film alone it is kept, as in `gloss`.
 //!
 //! The base is seen through T(w) = 1 − A(w), where A is no less than the albedo of the interface: that of Schlick's bound
-//! of its reflectance, of facets that lose nothing and have the larger of the grazing parts of both roughnesses. The base's
+//! of its reflectance, of facets that lose nothing, and under brushed ones with the grazing part of a smooth surface where
+//! that is larger than those of both roughnesses. The base's
 //! f is ρ T(o) T(i) / (π T̄) as in `plastic`, T̄ no less than the mean of T: reciprocal, and no albedo exceeds one.
 
 use crate::bsdf::brushed::Brushed;
 use crate::bsdf::conductor::upward;
 use crate::bsdf::event::{Letter, Scattered};
 use crate::bsdf::film::{Coating, Film};
-use crate::bsdf::fresnel::Schlick;
+use crate::bsdf::fresnel::{GRAZING_MEAN, Schlick, fifth_power};
 use crate::bsdf::ggx::{Ggx, reflect};
 use crate::bsdf::gloss::Between;
 use crate::bsdf::lobe::{Delta, Drawn, Evaluated, split};
@@ -72,9 +73,11 @@ impl Finish {
         let facets = Brushed::new(Vec2::new(along, alpha), given.along).and_then(|shape| {
             let of = |alpha| Ggx::new(alpha).map(|ggx| (ggx, Between::new(ggx)));
             let evenly = [of(shape.alphas.x)?, of(shape.alphas.y)?];
-            let brushed = shape.alphas.x > shape.alphas.y;
-            let multiple = if brushed { Rgb::ZERO } else { evenly[0].1.reflected(mean) };
-            Some(Facets { shape, evenly, multiple })
+            let mut facets = Facets { shape, evenly, multiple: Rgb::ZERO };
+            if !facets.is_brushed() {
+                facets.multiple = evenly[0].1.reflected(mean);
+            }
+            Some(facets)
         });
         let mut all = Self { facets, reflectance, bound, base, coupled: Rgb::ZERO };
         all.coupled = base * FRAC_1_PI / (Rgb::ONE - all.least_mean()).max(Rgb::splat(1e-6));
@@ -87,7 +90,8 @@ impl Finish {
             None => self.bound.mean(),
             Some(facets) => {
                 let [a, b] = facets.evenly.map(|(_, between)| between.means.grazing);
-                self.bound.split(1.0, a.max(b))
+                let brushed = if facets.is_brushed() { GRAZING_MEAN } else { 0.0 };
+                self.bound.split(1.0, a.max(b).max(brushed))
             }
         }
     }
@@ -111,9 +115,7 @@ impl Finish {
     pub(super) fn albedo(&self, w: Vec3) -> Rgb {
         let w = upward(w);
         let Some(facets) = &self.facets else { return self.bound.at(w.z) };
-        let grazing = |(ggx, between): (Ggx, Between)| between.grazing(w, ggx.stretched(w));
-        let [a, b] = facets.evenly.map(grazing);
-        (self.bound.split(1.0, a.max(b)) + facets.multiple * facets.missing(w)).min(Rgb::ONE)
+        (self.bound.split(1.0, facets.grazing(w)) + facets.multiple * facets.missing(w)).min(Rgb::ONE)
     }
 
     /// Of the base as it is seen through the interface.
@@ -169,6 +171,17 @@ impl Finish {
 }
 
 impl Facets {
+    fn is_brushed(&self) -> bool {
+        self.shape.alphas.x > self.shape.alphas.y
+    }
+
+    /// No less than the albedo of the (1 − v·h)⁵ part of the first bounce. Of brushed facets that is between those of both
+    /// roughnesses and of none, or up to 0.004 above them all (over a grid of roughnesses and directions).
+    fn grazing(&self, w: Vec3) -> f32 {
+        let [a, b] = self.evenly.map(|(ggx, between)| between.grazing(w, ggx.stretched(w)));
+        if self.is_brushed() { (a.max(b).max(fifth_power((1.0 - w.z).max(0.0))) + 0.006).min(1.0) } else { a }
+    }
+
     /// 1 − E(w) of facets that are not brushed.
     fn missing(&self, w: Vec3) -> f32 {
         let (ggx, between) = self.evenly[0];
