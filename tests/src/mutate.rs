@@ -68,7 +68,7 @@ impl Mutator {
                 return glb(&text, &piece.binary);
             }
             kind => {
-                for _ in 0..1 + random.below(2) {
+                for _ in 0..=random.below(2) {
                     change_value(&mut piece.json, &other.json, &mut random);
                 }
                 if kind == 7 {
@@ -108,7 +108,7 @@ fn change_bytes(bytes: &mut Vec<u8>, other: &[u8], random: &mut Random) {
 /// Numbers of four bytes at which readers of vertices and indices stumble.
 fn change_words(bytes: &mut [u8], random: &mut Random) {
     let numbers = [f32::NAN, f32::INFINITY, f32::MAX, -f32::MAX, f32::MIN_POSITIVE, 1e-45, -0.0, 1e20];
-    for _ in 0..1 + random.below(16) {
+    for _ in 0..=random.below(16) {
         let words = bytes.len() / 4;
         if words == 0 {
             return;
@@ -198,6 +198,7 @@ fn pick<'a>(value: &'a Value, random: &mut Random) -> &'a Value {
 }
 
 /// Gives value number `left` of a document, in the order of reading, another, or takes it away (`Some(None)`).
+#[expect(clippy::option_option, reason = "there is something to do, and it may be to take away")]
 fn replace(value: &mut Value, left: &mut usize, new: &mut Option<Option<Value>>) {
     if *left == 0 {
         *value = new.take().flatten().unwrap_or(Value::Null);

@@ -2,7 +2,7 @@
 //! has it.
 //!
 //! As in `ggx`, all is written with the stretched length σ(w) = √(cos² θ + α² sin² θ), where α is what w sees:
-//! αₜ² w.t² + α_b² w.b².
+//! `αₜ² w.t² + α_b² w.b²`.
 
 use crate::bsdf::ggx::{Ggx, SPECULAR_BELOW, reflect};
 use crate::math::warp;

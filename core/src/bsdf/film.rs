@@ -133,7 +133,7 @@ fn reflectance(cos: f32, coating: Coating, f0: Rgb) -> Rgb {
 /// Interference at a path difference in nm.
 fn interference(difference: f32) -> Rgb {
     let scaled = difference / FARTHEST * STEPS as f32;
-    if !(scaled < STEPS as f32) {
+    if scaled.is_nan() || scaled >= STEPS as f32 {
         return Rgb::ZERO;
     }
     let i = scaled as usize;

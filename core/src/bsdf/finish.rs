@@ -45,6 +45,7 @@ struct Facets {
 }
 
 #[derive(Clone, Copy, Debug)]
+#[expect(clippy::large_enum_variant, reason = "a surface is copied, not kept in a heap")]
 enum Reflectance {
     Plain(Schlick),
     Filmed(Film),

@@ -17,10 +17,8 @@ fn directions() -> Vec<Vec3> {
     all
 }
 
-#[test]
-fn values_are_finite_and_not_negative() {
-    let one = 1.0_f32.next_down();
-    let corners = [0.0, 1e-7, 0.5, one];
+/// Surfaces at the ends of what a file may say, and beyond.
+fn plain_extremes() -> Vec<SurfaceParameters> {
     let mut surfaces = Vec::new();
     for alpha in [0.0, 1e-3, 0.03, 0.4, 1.0_f32] {
         for base in [LAMBERT, METAL, PLASTIC, SHEET, SOLID] {
@@ -37,6 +35,12 @@ fn values_are_finite_and_not_negative() {
         transmission: 7.0,
         ..PLASTIC
     });
+    surfaces
+}
+
+/// Such layers on surfaces.
+fn layered_extremes() -> Vec<SurfaceParameters> {
+    let mut surfaces = Vec::new();
     let layers = Layers {
         coat: 1.0,
         coat_roughness: 0.0,
@@ -54,6 +58,12 @@ fn values_are_finite_and_not_negative() {
             surfaces.push(SurfaceParameters { layers, ..surface });
         }
     }
+    surfaces
+}
+
+/// Such finishes of surfaces.
+fn finished_extremes() -> Vec<SurfaceParameters> {
+    let mut surfaces = Vec::new();
     let edges = [
         Finishing { strength: 1.0, ..Finishing::NONE },
         Finishing {
@@ -78,7 +88,14 @@ fn values_are_finite_and_not_negative() {
             surfaces.push(SurfaceParameters { layers, roughness: alpha.sqrt(), ior: 0.0, ..base });
         }
     }
-    for surface in surfaces {
+    surfaces
+}
+
+#[test]
+fn values_are_finite_and_not_negative() {
+    let one = 1.0_f32.next_down();
+    let corners = [0.0, 1e-7, 0.5, one];
+    for surface in [plain_extremes(), layered_extremes(), finished_extremes()].concat() {
         let bsdf = Bsdf::from_surface(&surface);
         for wo in directions() {
             for wi in directions() {
