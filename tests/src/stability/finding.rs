@@ -75,7 +75,7 @@ impl Finding {
         }
     }
 
-    /// The rule: within [`ERRORS`] standard errors and [`ROUNDING`], nothing dropped, and an error that finds a bias.
+    /// The rule: within `ERRORS` standard errors and `ROUNDING`, nothing dropped, and an error that finds a bias.
     pub fn verdict(&self) -> Verdict {
         if self.invalid > 0 {
             return Verdict::Fails;
