@@ -172,8 +172,7 @@ fn show<C: Carriage>(
         Place::Surface(at) => {
             let Some(seen) = view.see(at.position, lens) else { return };
             let radiance = at.emission(at.side(seen.direction)) * at.alpha();
-            let start = at.leave(seen.direction);
-            let ray = Ray { origin: seen.end, direction: start - seen.end, t_max: 1.0, moment };
+            let ray = Ray { origin: seen.end, direction: at.arrive(seen.end) - seen.end, t_max: 1.0, moment };
             let squared = squared_distance(seen.end, at.position);
             (seen, radiance, ray, squared, cosine(seen.direction, at.ng))
         }

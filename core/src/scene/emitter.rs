@@ -91,7 +91,7 @@ impl Emitter {
             cos: cosine(direction, at.normal),
             squared: squared_distance(at.position, point),
             found_by: FoundBy::Both,
-            end: ShadowEnd::Point(at.leave(-direction)),
+            end: ShadowEnd::Point(at.arrive(point)),
         };
         (pdf.is_finite() && pdf > 0.0).then_some(event)
     }

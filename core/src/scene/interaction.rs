@@ -275,6 +275,12 @@ impl Interaction<'_> {
         self.point.leave(direction)
     }
 
+    /// Where a ray from `origin` must end so that it does not meet this surface.
+    #[inline]
+    pub fn arrive(&self, origin: Vec3) -> Vec3 {
+        self.point.arrive(origin)
+    }
+
     /// The side that a direction away from the surface leaves on.
     #[inline]
     pub fn side(&self, direction: Vec3) -> Side {

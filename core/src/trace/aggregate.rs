@@ -131,7 +131,7 @@ impl Aggregate {
         if ray.t_max.is_nan() || ray.t_max <= 0.0 {
             return ControlFlow::Continue(());
         }
-        let Some(prepared) = Prepared::new(ray.origin, ray.direction) else {
+        let Some(prepared) = Prepared::new(ray.origin, ray.direction, ray.t_max) else {
             return ControlFlow::Continue(());
         };
         if let Some(only) = self.only {
@@ -144,7 +144,7 @@ impl Aggregate {
                 None => self.visit_mesh::<L, O>(id, ray.moment, &prepared, visitor)?,
                 Some(moved) => {
                     let inner = if instance.motion == STANDS {
-                        Prepared::new(moved.point_inward(ray.origin), moved.direction_inward(ray.direction))
+                        moved.ray_inward(ray)
                     } else {
                         self.inside_moving(instance.motion, ray)
                     };
@@ -162,7 +162,7 @@ impl Aggregate {
     #[inline(never)]
     fn inside_moving(&self, motion: u32, ray: &Ray) -> Option<Prepared> {
         let moved = Moved::new(ray.moment.transform(&self.motions[motion as usize]))?;
-        Prepared::new(moved.point_inward(ray.origin), moved.direction_inward(ray.direction))
+        moved.ray_inward(ray)
     }
 
     fn visit_mesh<L: Lanes, O: Ordering>(

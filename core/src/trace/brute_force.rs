@@ -135,7 +135,7 @@ fn all_hits(meshes: &[Mesh], placed: &Aggregate, ray: &Ray) -> Vec<Hit> {
             None => (ray.origin, ray.direction),
             Some(moved) => (moved.point_inward(ray.origin), moved.direction_inward(ray.direction)),
         };
-        let Some(prepared) = Prepared::new(origin, direction) else { continue };
+        let Some(prepared) = Prepared::new(origin, direction, ray.t_max) else { continue };
         let mesh = &meshes[placement.mesh as usize];
         for triangle in 0..mesh.triangles.len() as u32 {
             let block = Block::new([(triangle, mesh.corners(triangle))].into_iter());
@@ -321,7 +321,7 @@ fn hits_agree_with_double_precision() {
         }
         compared += 1;
         let block = Block::new([(0, corners)].into_iter());
-        let ray = Prepared::new(origin, direction).unwrap();
+        let ray = Prepared::new(origin, direction, f32::INFINITY).unwrap();
         let found = block.intersect::<Native>(&ray, f32::MAX);
         assert_eq!(found.is_some(), least > 0.0 && t > 0.0);
         let Some(found) = found else { continue };

@@ -2,6 +2,8 @@
 
 use super::bounds::Bounds;
 use super::build_error::LARGEST_COORDINATE;
+use super::prepared::Prepared;
+use super::ray::Ray;
 use crate::math::robust::gamma;
 use glam::{Affine3A, DMat3, DVec3, Vec3};
 
@@ -117,6 +119,12 @@ impl Moved {
     #[inline]
     pub(super) fn direction_inward(&self, direction: Vec3) -> Vec3 {
         product(&self.inverse, direction)
+    }
+
+    /// A ray in the mesh's space; `None` where it cannot hit anything.
+    #[inline]
+    pub(super) fn ray_inward(&self, ray: &Ray) -> Option<Prepared> {
+        Prepared::new(self.point_inward(ray.origin), self.direction_inward(ray.direction), ray.t_max)
     }
 
     /// A point of the mesh, known within `error`, in the world, and how far from there a ray must start so that

@@ -214,3 +214,48 @@ fn walks_stay_on_their_side_of_closed_surfaces() {
         assert!(walks_that_cross(mesh, Affine3A::IDENTITY, above, 150_000, random) > 10, "{name}");
     }
 }
+
+/// Rays from anywhere to a triangle of the given size and distance from the origin, `width` as wide as long: how often one that
+/// ends before the triangle meets it, and how often one that ends behind it does not.
+fn wrong_arrivals([size, away, width]: [f32; 3], to_world: Affine3A, random: &mut Random) -> [usize; 2] {
+    let mut wrong = [0, 0];
+    for _ in 0..1000 {
+        let shift = random.in_cube() * away;
+        let mut positions: Vec<Vec3> = (0..3).map(|_| random.in_cube() * size + shift).collect();
+        let middle = positions[0].lerp(positions[1], random.uniform());
+        positions[2] = middle.lerp(positions[2], width);
+        let mesh = Mesh { positions, triangles: vec![[0, 1, 2]] };
+        let placed = Aggregate::build(vec![mesh.tree()], &[Placement { mesh: 0, to_world }]).unwrap();
+        for _ in 0..20 {
+            let (u, v) = (random.uniform(), random.uniform());
+            let weights = Vec2::new(u * (1.0 - v), v);
+            let point = SurfacePoint::new(mesh.corners(0), weights, placed.instances()[0].moved.as_ref());
+            let origin = random.in_cube();
+            let end = point.arrive(origin);
+            let until = |end: Vec3| Ray { t_max: 1.0, ..Ray::new(origin, end - origin) };
+            wrong[0] += usize::from(placed.occluded(&until(end), |_| true));
+            let is_steep = (end - origin).normalize().dot(point.normal).abs() > 0.1;
+            if is_steep && width == 1.0 && size == 1.0 && weights.min_element() > 0.1 && u < 0.9 {
+                let behind = end + (point.position - end) * 2.5;
+                wrong[1] += usize::from(!placed.occluded(&until(behind), |_| true));
+            }
+        }
+    }
+    wrong
+}
+
+#[test]
+fn rays_do_not_meet_the_surface_they_end_at() {
+    let random = &mut Random(11);
+    for (size, away) in [(1.0, 1.0), (0.1, 1.0), (1e-3, 1.0), (1.0, 0.0), (0.01, 0.0), (1e-4, 0.0)] {
+        for width in [1.0, 1e-2, 1e-4] {
+            let still = wrong_arrivals([size, away, width], Affine3A::IDENTITY, random);
+            assert_eq!(still, [0, 0], "size {size}, {away} away, width {width}");
+            let turn = Quat::from_euler(EulerRot::XYZ, 0.3, 1.1, -0.7);
+            let scales = Vec3::new(1.1, 0.3, -1.3);
+            let to_world = Affine3A::from_scale_rotation_translation(scales, turn, random.in_cube() * away);
+            let moved = wrong_arrivals([size, away, width], to_world, random);
+            assert_eq!(moved, [0, 0], "size {size}, {away} away, width {width}, moved");
+        }
+    }
+}

@@ -31,12 +31,14 @@ pub(super) struct Prepared {
     pub(super) outward: f32,
     /// and this is its inverse.
     pub(super) inward: f32,
+    /// Where the ray ends, in units of `t` here.
+    pub(super) end: f32,
 }
 
 impl Prepared {
     /// `None` where the ray cannot hit anything (see [`super::ray::Ray`]).
     #[inline(always)]
-    pub(super) fn new(origin: Vec3, direction: Vec3) -> Option<Self> {
+    pub(super) fn new(origin: Vec3, direction: Vec3, t_max: f32) -> Option<Self> {
         let longest = direction.x.abs().max(direction.y.abs()).max(direction.z.abs());
         // The exponents of the smallest and largest normal floats bring any other direction close to 1..2.
         let exponent = (longest.to_bits() >> 23).clamp(1, 253);
@@ -68,6 +70,7 @@ impl Prepared {
             shear: [direction[axes[0]] * depth, direction[axes[1]] * depth, depth],
             outward,
             inward,
+            end: t_max * inward,
         })
     }
 
@@ -105,7 +108,7 @@ mod tests {
     fn directions_are_scaled_by_powers_of_two() {
         for exponent in [-149, -140, -126, -100, -1, 0, 1, 50, 126, 127] {
             let length = 2.0_f64.powi(exponent) as f32;
-            let ray = Prepared::new(Vec3::ZERO, Vec3::new(0.0, -length, 0.0)).unwrap();
+            let ray = Prepared::new(Vec3::ZERO, Vec3::new(0.0, -length, 0.0), f32::INFINITY).unwrap();
             let rest = 2.0_f32.powi((exponent + 126).min(0) + (exponent - 126).max(0));
             assert_eq!(ray.direction, [0.0, -rest, 0.0], "2^{exponent}");
             assert_eq!((ray.outward * length, ray.outward * ray.inward), (rest, 1.0));
@@ -120,13 +123,13 @@ mod tests {
             for axis in 0..3 {
                 let mut v = good;
                 v[axis] = bad;
-                assert!(Prepared::new(v, good).is_none());
-                assert!(Prepared::new(good, v).is_none());
+                assert!(Prepared::new(v, good, f32::INFINITY).is_none());
+                assert!(Prepared::new(good, v, f32::INFINITY).is_none());
             }
         }
-        assert!(Prepared::new(good, Vec3::ZERO).is_none());
-        assert!(Prepared::new(good, Vec3::new(-0.0, -0.0, -0.0)).is_none());
-        assert!(Prepared::new(Vec3::splat(1e30), good).is_none());
-        assert!(Prepared::new(good, Vec3::MAX).is_some());
+        assert!(Prepared::new(good, Vec3::ZERO, f32::INFINITY).is_none());
+        assert!(Prepared::new(good, Vec3::new(-0.0, -0.0, -0.0), f32::INFINITY).is_none());
+        assert!(Prepared::new(Vec3::splat(1e30), good, f32::INFINITY).is_none());
+        assert!(Prepared::new(good, Vec3::MAX, f32::INFINITY).is_some());
     }
 }

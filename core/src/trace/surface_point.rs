@@ -12,6 +12,10 @@ const FROM_EDGES: f64 = 16.0;
 /// Most that a start is moved along its triangle, in the same unit: long thin triangles would ask for any distance.
 const FARTHEST: f64 = 4.0 * FROM_EDGES;
 
+/// Roundings of a ray's direction, which is the way to its end: in the difference, and three more where an instance is moved.
+/// The distance of what lies at a ray's end is exact.
+const ARRIVAL: f32 = 4.0;
+
 /// A point on a triangle in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfacePoint {
@@ -64,6 +68,16 @@ impl SurfacePoint {
     #[inline]
     pub fn leave(&self, direction: Vec3) -> Vec3 {
         offset_origin(self.start, Vec3::splat(self.error), self.normal, direction)
+    }
+
+    /// Where a ray from `origin` must end so that it does not meet this surface: where one that goes back would start, and
+    /// farther off by what rounds on the way. Without that, a lamp of a hundredth of the distance at a scene's centre, whose
+    /// points are known far more exactly than rays end, hid itself from 27 % of the next events to it.
+    #[inline]
+    pub fn arrive(&self, origin: Vec3) -> Vec3 {
+        let back = origin - self.start;
+        let error = self.error + gamma(ARRIVAL) * back.abs().max_element();
+        offset_origin(self.start, Vec3::splat(error), self.normal, back)
     }
 }
 

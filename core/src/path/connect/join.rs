@@ -48,7 +48,7 @@ pub fn join<S: Throughput<EyeState>, L: Throughput<LightState>>(
     if from_light.is_dead() || from_light.total() == Vec3::ZERO {
         return;
     }
-    let end = light.vertex.leave(-direction);
+    let end = light.vertex.at.arrive(vertex.at.position);
     let passes = unblocked::between(walk.scene, vertex, &walk.media, end, tally);
     if passes == Vec3::ZERO {
         return;

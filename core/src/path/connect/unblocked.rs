@@ -25,7 +25,7 @@ pub fn between(scene: &Scene, vertex: &Vertex<'_>, media: &Media, end: Vec3, tal
 /// ways are not alike, but path and light are to agree.
 pub fn seen(scene: &Scene, vertex: &Vertex<'_>, media: &Media, eye: Vec3, tally: &mut Tally) -> Rgb {
     let towards = eye - vertex.at.position;
-    let end = vertex.leave(towards);
+    let end = vertex.at.arrive(eye);
     let ray = Ray { origin: eye, direction: end - eye, t_max: 1.0, moment: vertex.at.moment };
     let passes = along(scene, &ray, tally);
     if passes == 0.0 {
