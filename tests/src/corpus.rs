@@ -181,13 +181,15 @@ fn numbers() -> Vec<u8> {
             {"bufferView": places, "componentType": 5122, "count": 4, "type": "VEC3", "min": [-100, -100, 0], "max": [100, 100, 20],
              "sparse": {"count": 1, "indices": {"bufferView": sparse, "componentType": 5121},
                 "values": {"bufferView": values}}},
-            {"bufferView": indices, "componentType": 5121, "count": 4, "type": "SCALAR"}
+            {"bufferView": indices, "componentType": 5121, "count": 4, "type": "SCALAR"},
+            {"bufferView": indices, "componentType": 5121, "count": 3, "type": "SCALAR"}
         ]),
     );
-    let primitive = |mode: u64| json!({"attributes": {"POSITION": 0}, "indices": 1, "mode": mode});
+    let primitive =
+        |mode: u64, indices: u64| json!({"attributes": {"POSITION": 0}, "indices": indices, "mode": mode});
     glb.document().insert(
         "meshes".to_owned(),
-        json!([{"primitives": [primitive(5), primitive(6)]}, {"primitives": [primitive(4)]}]),
+        json!([{"primitives": [primitive(5, 1), primitive(6, 1)]}, {"primitives": [primitive(4, 2)]}]),
     );
     glb.document().insert("extensionsUsed".to_owned(), json!(["KHR_mesh_quantization"]));
     glb.document().insert("extensionsRequired".to_owned(), json!(["KHR_mesh_quantization"]));
