@@ -80,6 +80,8 @@ fn cheap_cases_find_a_bias_of_a_third_of_a_percent() {
         ("a lamp that stands on the floor", "path", 0.05),
         ("two lamps that meet in a corner of the floor", "path", 0.02),
         ("a sun of 10⁻³ degrees", "path", 0.02),
+        ("a lamp of 10⁻⁴ m by 1 m", "path", 0.02),
+        ("a small lamp in the middle of its scene", "path", 0.02),
         ("a lamp of 10⁴ m", "path", 0.02),
         ("a ball of index 2.4", "path", 0.02),
         ("floor, light and camera in an absorber", "bidirectional", 0.02),
