@@ -19,7 +19,8 @@ pub struct Piece {
 
 /// All of them.
 pub fn scenes() -> Vec<Piece> {
-    [cornell(), materials(), moving(), hanging(), many(), numbers()].iter().map(|glb| piece(glb)).collect()
+    let built = [cornell(), materials(), moving(), hanging(), many(), numbers()];
+    built.iter().map(|glb| piece(glb)).chain([under_pictures()]).collect()
 }
 
 /// The two chunks of a binary glTF that [`crate::glb::glb`] wrote.
@@ -148,6 +149,22 @@ fn hanging() -> Vec<u8> {
     );
     glb.animate(bones[1], "rotation", "LINEAR", &[0.0, 1.0], &[0., 0., 0., 1., 0., 0., 0.7, 0.7]);
     framed(glb)
+}
+
+/// Light of six pictures around a ball.
+fn under_pictures() -> Piece {
+    let mut glb = Glb::new();
+    glb.body(json!({}), sphere(Vec3::ZERO, 0.7, 6));
+    let faces = [[255, 0, 0, 255], [0, 255, 0, 51], [90; 4], [255; 4], [1, 2, 3, 4], [0; 4]];
+    let images = faces.map(|texel| glb.texture(&png(2, &[texel; 4]), json!({})));
+    let light = json!({"intensity": 2.0, "rotation": [0, 0.6, 0, 0.8], "specularImages": [images],
+        "specularImageSize": 2, "irradianceCoefficients": [[0, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0, 0],
+        [0, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0, 0]]});
+    glb.document().insert("extensions".to_owned(), json!({"EXT_lights_image_based": {"lights": [light]}}));
+    glb.perspective(Vec3::new(0.0, 0.5, 5.0), Vec3::ZERO, 40.0);
+    let mut piece = piece(&glb.finish());
+    piece.json["scenes"][0]["extensions"] = json!({"EXT_lights_image_based": {"light": 0}});
+    piece
 }
 
 /// Instances, in the file and by extension.
