@@ -7,6 +7,7 @@ mod column;
 mod commit;
 mod connection;
 mod control;
+mod gathered;
 mod job;
 mod ledger;
 mod merger;
@@ -147,7 +148,7 @@ impl Store for Sql {
     }
 
     async fn claim(&self, claims: Vec<Claim>, time: Duration) -> Result<Vec<bool>> {
-        self.writer.write(move |db| Box::pin(ledger::claim(db, claims, time))).await
+        self.writer.claim(claims, time).await
     }
 
     async fn renew(&self, worker: &WorkerId, leases: Vec<LeaseId>, time: Duration) -> Result<Vec<LeaseId>> {
@@ -170,7 +171,7 @@ impl Store for Sql {
     }
 
     async fn commit(&self, commit: NewCommit) -> Result<CommitOutcome> {
-        self.writer.write(|db| Box::pin(commit::commit(db, commit))).await
+        self.writer.commit(commit).await
     }
 
     async fn commits(&self, job: &JobId, lane: Lane, blocks: Range<u32>) -> Result<Vec<CommitRow>> {
