@@ -4,6 +4,7 @@ use super::{
     column::{batch, commit, count, lease, millis},
     connection::{Db, Row},
     merger::require,
+    notice,
     query::query,
 };
 use crate::store::{
@@ -58,7 +59,10 @@ pub(super) async fn begin(db: &mut Db, job: &str, now: i64) -> Result<()> {
         "UPDATE job SET state = 'running', version = version + 1, started_ms = coalesce(started_ms, $2)
          WHERE id = $1 AND state = 'queued'",
     );
-    db.execute(begun.bind(job).bind(now)).await.map(drop)
+    if db.execute(begun.bind(job).bind(now)).await? > 0 {
+        notice::note(db, job, now).await?;
+    }
+    Ok(())
 }
 
 /// Gives those leases `time` from now that the worker still has.

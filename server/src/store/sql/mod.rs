@@ -11,6 +11,7 @@ mod gathered;
 mod job;
 mod ledger;
 mod merger;
+mod notice;
 mod open;
 mod query;
 #[cfg(test)]
@@ -21,6 +22,7 @@ mod writer;
 use super::{
     Sharing, Store,
     error::{Result, StoreError},
+    notice::NoticeRow,
     row::{
         Added, BatchKey, Brought, Claim, CommitOutcome, CommitRow, Counts, Extension, IdempotencyKey,
         JobChange, JobFilter, JobHead, JobRow, Lane, Ledger, Mandate, NewCheckpoint, NewCommit, NewJob,
@@ -314,6 +316,21 @@ impl Store for Sql {
     async fn free_merge(&self, job: &JobId) -> Result<()> {
         let job = job.clone();
         self.writer.write(move |db| Box::pin(async move { control::free_merge(db, &job).await })).await
+    }
+
+    async fn due_notices(&self, most: u32, time: Duration) -> Result<Vec<NoticeRow>> {
+        if !notice::any_due(&mut self.reader().await?).await? {
+            return Ok(Vec::new());
+        }
+        self.writer.write(move |db| Box::pin(notice::take(db, most, time))).await
+    }
+
+    async fn end_notice(&self, sequence: i64) -> Result<()> {
+        self.writer.write(move |db| Box::pin(notice::end(db, sequence))).await
+    }
+
+    async fn put_off_notice(&self, sequence: i64, time: Duration) -> Result<()> {
+        self.writer.write(move |db| Box::pin(notice::put_off(db, sequence, time))).await
     }
 
     async fn forget_keys(&self, age: Duration) -> Result<()> {
