@@ -25,4 +25,6 @@ mod stability;
 mod techniques;
 mod tidy;
 mod tls;
+mod tokens;
+mod webhooks;
 mod weights;

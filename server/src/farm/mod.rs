@@ -17,6 +17,7 @@ pub mod lease;
 pub mod live;
 pub mod mandates;
 pub mod needs;
+pub mod notices;
 pub mod open;
 pub mod others;
 pub mod parts;
@@ -41,6 +42,7 @@ pub(crate) mod tests;
 use crate::{
     blobs::Blobs,
     store::{Store, row::JobRow},
+    webhook::Messenger,
 };
 use book::Book;
 use counters::Counters;
@@ -79,6 +81,7 @@ pub struct Farm {
     tasks: TaskTracker,
     decoders: tokio::sync::Semaphore,
     inspectors: tokio::sync::Semaphore,
+    messenger: Messenger,
     book: Mutex<Book>,
     crew: Mutex<Crew>,
     lives: Mutex<BTreeMap<JobId, Arc<Live>>>,

@@ -11,7 +11,11 @@ use super::{
 };
 use crate::{
     fail_point::FailPoint,
-    store::row::{Added, IdempotencyKey, NewJob},
+    store::{
+        notice::Webhook,
+        row::{Added, IdempotencyKey, NewJob},
+    },
+    webhook,
 };
 use ovtigre_core::{
     bsdf::event::Letters,
@@ -49,6 +53,7 @@ const ASPECT_DEFAULT: f64 = 16.0 / 9.0;
 impl Farm {
     /// Checks a request; what it would become, or all its faults.
     pub async fn check(&self, request: JobRequest) -> Result<JobSpec> {
+        self.webhook(&request)?;
         let scene = request.scene.clone();
         let scene = scene.ok_or_else(|| FarmError::Request(vec![fault("/scene", "'scene' is required")]))?;
         let mut contents = match self.upload_at("/scene", &scene).await?.content {
@@ -75,7 +80,15 @@ impl Farm {
                 }
             },
         }
-        resolve(request, &contents, &self.rules).map_err(FarmError::Request)
+        let mut spec = resolve(request, &contents, &self.rules).map_err(FarmError::Request)?;
+        spec.request.webhook = spec.request.webhook.as_ref().map(webhook::shown);
+        Ok(spec)
+    }
+
+    /// Whom to tell of the job's changes.
+    fn webhook(&self, request: &JobRequest) -> Result<Option<Webhook>> {
+        let check = |wish| webhook::check(wish, self.messenger.reach());
+        request.webhook.as_ref().map(check).transpose().map_err(FarmError::Request)
     }
 
     /// An error where the owner has as many jobs under way as one may have.
@@ -120,6 +133,7 @@ impl Farm {
             return self.taken_before(before).await;
         }
         self.need_room()?;
+        let webhook = self.webhook(&request)?;
         let mut spec = self.check(request).await?;
         self.has_room_for(owner.as_deref())?;
         spec.owner = owner;
@@ -133,6 +147,7 @@ impl Farm {
             spec: serde_json::to_string(&spec).map_err(|e| FarmError::Damaged(e.to_string()))?,
             regions: spec.schedule().regions().len() as u32,
             replicates: spec.settings.replicates,
+            webhook,
         };
         FailPoint::JobBeforeRow.pass();
         match self.store.add_job(new, key).await? {
