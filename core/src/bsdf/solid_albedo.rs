@@ -3,8 +3,8 @@
 //! Kept is the missing flux M = 1 − E(μ, α, η), met from the rare side and from the dense side. Coordinates of
 //! direction and roughness are those of `albedo`; planes are uniform in √((η − 1) / (η + 1)) from η = 1.1 to 3.
 //! From the dense side M has a kink at the critical angle that no small table resolves, and it is more
-//! important that albedos stay at or below one than that the last percent is returned:
-//! from every node [`MARGIN`] is subtracted, more than interpolation errs by (test below).
+//! important that albedos stay at or below one than that the last of it is returned:
+//! from every node is subtracted more than interpolation errs by in the cells around it (test below), 0.9 % at most.
 //!
 //! The means 2 ∫ M μ dμ belong to the *interpolated* table; they are linear in the plane, and are kept over
 //! α² ln(1 + 1/α²), on a finer grid of α.
@@ -24,9 +24,11 @@ const FINER: usize = 16;
 const MEANS: usize = (ROWS - 1) * FINER + 1;
 const NODES: usize = 2 * PLANES * ROWS * COLUMNS;
 const LENGTH: usize = 4 * (NODES + 2 * PLANES * MEANS);
-/// Subtracted from every node.
+/// The least and the most that is taken off a node.
 #[cfg(test)]
-const MARGIN: f64 = 0.009;
+const LEAST: f64 = 8e-4;
+#[cfg(test)]
+const MOST: f64 = 0.009;
 /// Factor of the means: more than their interpolation errs by.
 const SAFETY: f32 = 1.002;
 /// Ratios of indices in the table. Below the least, refraction at grazing angles changes within
@@ -125,6 +127,7 @@ mod tests {
     use super::*;
     use crate::bsdf::ggx::Ggx;
     use crate::bsdf::tests::oracle::{alpha_of, cosine_of, hemisphere, passed, visible_mean};
+    use rayon::prelude::*;
 
     /// E met from the side whose index is 1 of an interface with relative index `eta`.
     fn integrate(mu: f64, alpha: f64, eta: f64, n: usize) -> f64 {
@@ -156,16 +159,57 @@ mod tests {
         1.0 - integrate(mu, alpha, if side == 0 { ratio } else { 1.0 / ratio }, n)
     }
 
+    /// Side, plane, row and column of a node.
+    fn place(i: usize) -> [usize; 4] {
+        [i / COLUMNS / ROWS / PLANES, i / COLUMNS / ROWS % PLANES, i / COLUMNS % ROWS, i % COLUMNS]
+    }
+
+    fn exact(i: usize) -> f64 {
+        let [side, plane, row, column] = place(i);
+        missing(side, plane as f64, row as f64, column as f64, 160)
+    }
+
+    /// The most that interpolation between exact nodes exceeds the integral by in the cell above a node.
+    fn excess(nodes: &[f64], i: usize) -> f64 {
+        let [side, plane, row, column] = place(i);
+        if plane + 1 == PLANES || row + 1 == ROWS || column + 1 == COLUMNS {
+            return 0.0;
+        }
+        let corner = |k: usize| nodes[i + (k & 1) + (k >> 1 & 1) * COLUMNS + (k >> 2) * COLUMNS * ROWS];
+        // No more can be taken off nodes than they are.
+        if (0..8).any(|k| corner(k) < 2.0 * MOST) {
+            return MOST;
+        }
+        let columns = [0.25, 0.5, 0.75];
+        let mut most: f64 = 0.0;
+        for (p, r, c) in (0..12).map(|k| ((k / 6) as f64 / 2.0, (k / 3 % 2) as f64 / 2.0, columns[k % 3])) {
+            let share = |bit: usize, share: f64| if bit > 0 { share } else { 1.0 - share };
+            let weight = |k: usize| share(k & 1, c) * share(k & 2, r) * share(k & 4, p);
+            let between: f64 = (0..8).map(|k| weight(k) * corner(k)).sum();
+            let there = missing(side, plane as f64 + p, row as f64 + r, column as f64 + c, 112);
+            most = most.max(between - there);
+        }
+        most
+    }
+
+    /// What is taken off a node: more than interpolation in the cells around it errs by.
+    fn margin(excesses: &[f64], i: usize) -> f64 {
+        let [_, plane, row, column] = place(i);
+        let around = |k: usize| {
+            let (c, r, p) = (k & 1, k >> 1 & 1, k >> 2);
+            (column >= c && row >= r && plane >= p)
+                .then(|| excesses[i - c - r * COLUMNS - p * COLUMNS * ROWS])
+        };
+        (1.3 * (0..8).filter_map(around).fold(0.0, f64::max) + LEAST).min(MOST)
+    }
+
     #[test]
     #[ignore = "writes solid_albedo.bin"]
     fn write() {
-        let mut table = Vec::new();
-        for i in 0..NODES {
-            let (column, row) = ((i % COLUMNS) as f64, (i / COLUMNS % ROWS) as f64);
-            let plane = (i / COLUMNS / ROWS % PLANES) as f64;
-            let exact = missing(i / COLUMNS / ROWS / PLANES, plane, row, column, 160);
-            table.push((exact - MARGIN).max(0.0) as f32);
-        }
+        let nodes: Vec<f64> = (0..NODES).into_par_iter().map(exact).collect();
+        let excesses: Vec<f64> = (0..NODES).into_par_iter().map(|i| excess(&nodes, i)).collect();
+        let mut table: Vec<f32> =
+            (0..NODES).map(|i| (nodes[i] - margin(&excesses, i)).max(0.0) as f32).collect();
         for i in 0..2 * PLANES * MEANS {
             let row = (i % MEANS) as f64 / FINER as f64;
             let above = (row as usize).min(ROWS - 2);
@@ -185,20 +229,20 @@ mod tests {
     }
 
     #[test]
-    fn the_table_is_the_integral_less_the_margin() {
+    fn the_table_is_the_integral_less_a_margin() {
         for i in (0..NODES).step_by(131) {
-            let (column, row) = ((i % COLUMNS) as f64, (i / COLUMNS % ROWS) as f64);
-            let plane = (i / COLUMNS / ROWS % PLANES) as f64;
-            let exact = missing(i / COLUMNS / ROWS / PLANES, plane, row, column, 160);
-            let error = f64::from(TABLE[i]) - (exact - MARGIN).max(0.0);
-            assert!(error.abs() < 1e-6, "node {i}: off by {error}");
+            let exact = exact(i);
+            let taken = exact - f64::from(TABLE[i]);
+            let range = LEAST.min(exact) - 1e-6..MOST + 1e-6;
+            assert!(range.contains(&taken), "node {i}: {taken} taken of {exact}");
         }
     }
 
     #[test]
     fn interpolation_never_exceeds_the_integral() {
         for i in (0..NODES).step_by(29) {
-            let column = ((i % COLUMNS) as f64 + 0.5).min(38.5);
+            let off = [0.5, 0.3, 0.7, 0.15, 0.85][i % 5];
+            let column = ((i % COLUMNS) as f64 + off).min(38.0 + off);
             let row = ((i / COLUMNS % ROWS) as f64 + 0.5).min(18.5);
             let plane = ((i / COLUMNS / ROWS % PLANES) as f64 + 0.5).min(8.5);
             let (k, alpha) = (i / COLUMNS / ROWS / PLANES, alpha_of(row / (ROWS - 1) as f64));
