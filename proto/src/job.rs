@@ -3,6 +3,7 @@
 use crate::{
     id::BlobId,
     pair::{self, EnvironmentRequest},
+    webhook::WebhookRequest,
 };
 use ovtigre_core::{
     film::size::{Region, Size},
@@ -109,6 +110,9 @@ pub struct JobRequest {
     /// So many workers hold its batches at a time, at most.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_workers: Option<u32>,
+    /// Whom to tell when the job's state changes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub webhook: Option<WebhookRequest>,
 }
 
 /// A method by name.

@@ -12,3 +12,4 @@ pub mod problem;
 pub mod route;
 pub mod scene;
 pub mod status;
+pub mod webhook;

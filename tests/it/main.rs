@@ -27,4 +27,6 @@ mod stability;
 mod techniques;
 mod tidy;
 mod tls;
+mod tokens;
+mod webhooks;
 mod weights;

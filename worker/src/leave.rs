@@ -52,8 +52,9 @@ impl Bell {
         loop {
             signal().await;
             let urgency = if self.heard() == Leave::Stay { first } else { Leave::Now };
-            tracing::info!(?urgency, "told to leave");
+            // First: a log that cannot be written must not keep anybody from leaving.
             self.ring(urgency);
+            tracing::info!(?urgency, "told to leave");
         }
     }
 

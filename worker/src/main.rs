@@ -42,7 +42,9 @@ fn main() -> ExitCode {
 }
 
 fn work(line: &Line) -> anyhow::Result<()> {
-    tracing_subscriber::fmt().with_env_filter(&line.log).with_writer(stderr).init();
+    let log = tracing_subscriber::fmt().with_env_filter(&line.log).with_writer(stderr);
+    // Where nobody reads it any more, there is nobody to be told, and no reason to fall.
+    log.log_internal_errors(false).init();
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?;
     let result = runtime.block_on(async {
         let bell = Bell::default();

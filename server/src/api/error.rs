@@ -102,7 +102,7 @@ impl From<FarmError> for ApiError {
             FarmError::Stopping | FarmError::Store(StoreError::Closed) => {
                 of(StatusCode::SERVICE_UNAVAILABLE, "stopping", "Stopping")
             }
-            FarmError::Store(_) | FarmError::Blob(_) | FarmError::Damaged(_) => {
+            FarmError::Store(_) | FarmError::Blob(_) | FarmError::Damaged(_) | FarmError::Messenger(_) => {
                 tracing::error!(error = detail, "a request failed");
                 of(StatusCode::INTERNAL_SERVER_ERROR, "internal", "Internal error")
             }

@@ -51,9 +51,12 @@ pub async fn metrics(State(farm): State<Arc<Farm>>) -> Result<Response> {
         text.labelled("ovtigre_jobs", "state", state.name(), number);
     }
     text.kind("ovtigre_workers", "gauge", "Workers by state.");
-    for (state, name) in
-        [(WorkerState::Active, "active"), (WorkerState::Draining, "draining"), (WorkerState::Lost, "lost")]
-    {
+    for (state, name) in [
+        (WorkerState::Active, "active"),
+        (WorkerState::Draining, "draining"),
+        (WorkerState::Lost, "lost"),
+        (WorkerState::Aside, "aside"),
+    ] {
         let number = counts.workers.iter().find(|(s, _)| *s == state).map_or(0, |(_, n)| *n);
         text.labelled("ovtigre_workers", "state", name, number);
     }
@@ -71,6 +74,10 @@ pub async fn metrics(State(farm): State<Arc<Farm>>) -> Result<Response> {
     text.plain("ovtigre_batches_appended_total", farm.counters.appended_batches());
     text.kind("ovtigre_merged_bytes_total", "counter", "Bytes of sums appended to pictures.");
     text.plain("ovtigre_merged_bytes_total", farm.counters.merged_bytes());
+    text.kind("ovtigre_notices_total", "counter", "Notices to webhooks by what became of them.");
+    for (fate, number) in ["taken", "given_up"].into_iter().zip(farm.counters.notices()) {
+        text.labelled("ovtigre_notices_total", "fate", fate, number);
+    }
     Ok(([(header::CONTENT_TYPE, "text/plain; version=0.0.4; charset=utf-8")], text.0).into_response())
 }
 

@@ -16,6 +16,7 @@ use ovtigre_proto::{
     problem::Problem,
     scene::{PartsReceived, SceneReport},
     status::{JobEvent, JobStatus, Page, Scaling, WorkerStatus},
+    webhook::Notice,
 };
 use schemars::{JsonSchema, Schema, SchemaGenerator, generate::SchemaSettings};
 use serde_json::{Map, Value, json};
@@ -278,7 +279,8 @@ fn content(generator: &mut SchemaGenerator, of: Content) -> Option<Value> {
     match of {
         Content::Nothing => None,
         Content::Json(schema) => Some(json!({"application/json": {"schema": schema(generator)}})),
-        Content::Media(media) if media.starts_with("text/") => {
+        // A stream of events is no text but fields: what is in them, its door says.
+        Content::Media(media) if media.starts_with("text/") && media != "text/event-stream" => {
             Some(json!({media: {"schema": {"type": "string"}}}))
         }
         Content::Media(media) => Some(json!({media: {}})),
@@ -302,10 +304,52 @@ fn given(mut schema: Value) -> Value {
     schema
 }
 
+/// A BLAKE3 hash.
+const HASH: &str = "^[0-9a-f]{64}$";
+
+/// What a header of a request holds.
+fn header(name: &str) -> Value {
+    let pattern = match name {
+        "ovtigre-seconds" => return json!({"type": "number", "minimum": 0, "maximum": 1e9}),
+        "Idempotency-Key" => "^[!-~]{1,255}$",
+        "Last-Event-ID" => r"^[0-9]{1,18}\.[0-9]{1,18}\.[0-9]{1,18}$",
+        "If-Match" => r#"^(\*|"[0-9]{1,18}")$"#,
+        "Content-Range" => r"^bytes ([0-9]{1,12}-[0-9]{1,12}|\*)/[0-9]{1,12}$",
+        _ => return json!({"type": "string"}),
+    };
+    json!({"type": "string", "pattern": pattern})
+}
+
+/// Says of every whole number how large it may be: what its format means is not known to all.
+fn bound_numbers(value: &mut Value) {
+    match value {
+        Value::Array(all) => all.iter_mut().for_each(bound_numbers),
+        Value::Object(fields) => {
+            let most = match fields.get("format").and_then(Value::as_str) {
+                Some("uint32") => Some(u64::from(u32::MAX)),
+                Some("int32") => Some(i32::MAX as u64),
+                Some("uint64") => Some(u64::MAX),
+                _ => None,
+            };
+            if let Some(most) = most {
+                fields.entry("maximum").or_insert_with(|| most.into());
+            }
+            if fields.get("format").is_some_and(|format| format == "int32") {
+                fields.entry("minimum").or_insert_with(|| i32::MIN.into());
+            }
+            fields.values_mut().for_each(bound_numbers);
+        }
+        _ => {}
+    }
+}
+
 fn parameters(generator: &mut SchemaGenerator, path: &str, operation: &Operation) -> Vec<Value> {
     let mut all = Vec::new();
     if path.contains("{id}") {
-        all.push(json!({"name": "id", "in": "path", "required": true, "schema": {"type": "string"}}));
+        let hash = path.starts_with("/v1/scenes/");
+        let schema =
+            if hash { json!({"type": "string", "pattern": HASH}) } else { json!({"type": "string"}) };
+        all.push(json!({"name": "id", "in": "path", "required": true, "schema": schema}));
     }
     let query = operation.query.map(|schema| schema(generator));
     let fields = query.as_ref().and_then(|schema| schema.get("properties")?.as_object());
@@ -324,10 +368,7 @@ fn parameters(generator: &mut SchemaGenerator, path: &str, operation: &Operation
         all.push(parameter);
     }
     all.extend(
-        operation
-            .heads
-            .iter()
-            .map(|name| json!({"name": name, "in": "header", "schema": {"type": "string"}})),
+        operation.heads.iter().map(|name| json!({"name": name, "in": "header", "schema": header(name)})),
     );
     all
 }
@@ -391,7 +432,11 @@ fn document() -> Value {
     }
     let problem = generator.subschema_for::<Problem>();
     generator.subschema_for::<JobEvent>();
-    json!({
+    let notice = generator.subschema_for::<Notice>();
+    let signed = ["webhook-id", "webhook-timestamp", "webhook-signature"];
+    let signed = signed
+        .map(|name| json!({"name": name, "in": "header", "required": true, "schema": {"type": "string"}}));
+    let mut document = json!({
         "openapi": "3.1.0",
         "info": {
             "title": "ovtigre",
@@ -400,6 +445,13 @@ fn document() -> Value {
             "license": {"name": "MIT OR Apache-2.0", "identifier": "MIT OR Apache-2.0"},
         },
         "paths": paths,
+        "webhooks": {"jobState": {"post": {
+            "operationId": "tellJobState",
+            "summary": "A job's state has changed; signed as Standard Webhooks say. Any 2xx takes it, 410 ends it, all else is tried again",
+            "parameters": signed,
+            "requestBody": {"required": true, "content": {"application/json": {"schema": notice}}},
+            "responses": {"2XX": {"description": "Taken"}},
+        }}},
         "components": {
             "schemas": generator.take_definitions(true),
             "responses": {"Problem": {
@@ -408,7 +460,9 @@ fn document() -> Value {
             }},
             "securitySchemes": {"token": {"type": "http", "scheme": "bearer"}},
         },
-    })
+    });
+    bound_numbers(&mut document);
+    document
 }
 
 #[cfg(test)]

@@ -54,7 +54,7 @@ pub async fn put(
             (StatusCode::OK, [(header::LOCATION, route::scene(&report.id))], Json(report)).into_response()
         );
     }
-    match headers.get(header::CONTENT_RANGE) {
+    match headers.get(header::CONTENT_RANGE).filter(|value| !value.is_empty()) {
         None => upload(&farm, body, Some(named)).await,
         Some(range) => part(&farm, body, &named, content_range(range)?).await,
     }
@@ -69,20 +69,31 @@ enum ContentRange {
 }
 
 fn content_range(value: &HeaderValue) -> Result<ContentRange> {
-    let parse = || {
+    let numbers = || {
         let (range, whole) = value.to_str().ok()?.trim().strip_prefix("bytes ")?.split_once('/')?;
-        let whole = whole.trim().parse().ok()?;
+        let whole: u64 = whole.trim().parse().ok()?;
         if range.trim() == "*" {
-            return Some(ContentRange::Ask(whole));
+            return Some((None, whole));
         }
         let (first, last) = range.split_once('-')?;
-        let (from, last): (u64, u64) = (first.trim().parse().ok()?, last.trim().parse().ok()?);
-        (from <= last && last < whole).then_some(ContentRange::Part(Span { from, to: last + 1, whole }))
+        Some((Some((first.trim().parse().ok()?, last.trim().parse().ok()?)), whole))
     };
-    parse().ok_or_else(|| {
-        let detail = "Content-Range is 'bytes FIRST-LAST/LENGTH', or 'bytes */LENGTH' to ask what is there";
-        ApiError::header(detail.to_owned())
-    })
+    match numbers() {
+        None => {
+            let detail =
+                "Content-Range is 'bytes FIRST-LAST/LENGTH', or 'bytes */LENGTH' to ask what is there";
+            Err(ApiError::header(detail.to_owned()))
+        }
+        Some((None, whole)) => Ok(ContentRange::Ask(whole)),
+        Some((Some((from, last)), whole)) if from <= last && last < whole => {
+            Ok(ContentRange::Part(Span { from, to: last + 1, whole }))
+        }
+        Some((Some((from, last)), whole)) => {
+            let detail = format!("bytes {from} to {last} are no part of {whole} bytes");
+            let (status, title) = (StatusCode::RANGE_NOT_SATISFIABLE, "Range not satisfiable");
+            Err(ApiError::new(status, "range-not-satisfiable", title, detail))
+        }
+    }
 }
 
 /// A part of a file; told is how much is there, or, when all is there, what is in it.

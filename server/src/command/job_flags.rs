@@ -13,6 +13,7 @@ use ovtigre_proto::{
     id::BlobId,
     job::{JobRequest, MethodRequest, WeightsRequest},
     pair::EnvironmentRequest,
+    webhook::WebhookRequest,
 };
 use serde::de::DeserializeOwned;
 use std::path::PathBuf;
@@ -102,6 +103,10 @@ pub(crate) struct JobFlags {
     /// Workers that hold batches of the job at a time, at most [default: any number].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) max_workers: Option<u32>,
+    /// Address to tell of the job's changes of state; the secret that notices are signed with is in
+    /// `OVTIGRE_WEBHOOK_SECRET`.
+    #[arg(long, value_name = "URL")]
+    pub(crate) webhook: Option<String>,
     /// Write error against run time and how the job ended to this file.
     #[arg(long, value_name = "FILE.json")]
     pub(crate) report: Option<PathBuf>,
@@ -150,6 +155,11 @@ impl JobFlags {
             weight: self.weight,
             tags: self.tags.clone(),
             max_workers: self.max_workers,
+            webhook: self.webhook.clone().map(|url| WebhookRequest {
+                url,
+                // A secret in the environment is not in the list of processes.
+                secret: std::env::var("OVTIGRE_WEBHOOK_SECRET").ok(),
+            }),
         }
     }
 }

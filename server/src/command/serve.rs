@@ -13,6 +13,7 @@ use ovtigre::{
     farm::{rules::Rules, space::Room},
     serve::{OwnPort, ServeConfig, free_bytes, start},
     store::{Store as _, sql::Sql},
+    webhook::Reach,
 };
 use std::{
     net::{IpAddr, SocketAddr},
@@ -68,6 +69,10 @@ pub(crate) struct Serve {
     /// Requests a second of one token, at most; of workers any number.
     #[arg(long, value_name = "N", default_value_t = 100.0, value_parser = not_negative)]
     requests_per_second: f64,
+    /// Tell webhooks of jobs' changes also at addresses of this machine and of private networks: whoever may send jobs can
+    /// then have this machine post there.
+    #[arg(long)]
+    private_webhooks: bool,
     /// Listen on other addresses than loopback although anyone who reaches them may do anything.
     #[arg(long)]
     insecure: bool,
@@ -167,6 +172,7 @@ impl Serve {
             reserve_bytes: (self.reserve * f64::from(1 << 30)) as u64,
             jobs_per_token: self.jobs_per_token,
             partials_kept: self.partials_kept,
+            notices_to: if self.private_webhooks { Reach::Anywhere } else { Reach::Public },
             // Where blobs are elsewhere the disk is not what fills.
             room: Room::new(move || free_bytes(&disk)),
             ..Rules::default()

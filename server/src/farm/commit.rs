@@ -81,10 +81,17 @@ impl Farm {
     ) -> Result<Commit> {
         self.need_room_for_sums()?;
         let (job, key) = batch_of(lease).ok_or_else(|| FarmError::not_found("lease", lease))?;
-        let row = self.store.job(&job).await?.ok_or_else(|| FarmError::not_found("lease", lease))?;
-        let Some(live) = self.meet(&job).await?.filter(|_| !row.state.is_over()) else {
-            self.counters.count(Fate::NotNeeded);
-            return Ok(Commit::NotNeeded);
+        // Whether a job that is in memory is over, the store says when the sum is taken.
+        let live = match self.live(&job) {
+            Some(live) => live,
+            None => {
+                let row = self.store.job(&job).await?.ok_or_else(|| FarmError::not_found("lease", lease))?;
+                let Some(live) = self.meet(&job).await?.filter(|_| !row.state.is_over()) else {
+                    self.counters.count(Fate::NotNeeded);
+                    return Ok(Commit::NotNeeded);
+                };
+                live
+            }
         };
         let batch = live.batch(key).ok_or_else(|| FarmError::not_found("lease", lease))?;
         let Decoded { sum, hash, solution } = match self.decode(&live, batch, partial.clone()).await {

@@ -13,6 +13,8 @@ pub struct Counters {
     failed: AtomicU64,
     appended: AtomicU64,
     merged_bytes: AtomicU64,
+    told: AtomicU64,
+    not_told: AtomicU64,
 }
 
 /// What became of a batch.
@@ -76,6 +78,21 @@ impl Counters {
     pub fn appended(&self, batches: u64, bytes: u64) {
         self.appended.fetch_add(batches, Ordering::Relaxed);
         self.merged_bytes.fetch_add(bytes, Ordering::Relaxed);
+    }
+
+    /// Somebody was told of a job's change.
+    pub fn told(&self) {
+        self.told.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// Somebody was not told of a job's change, and will not be.
+    pub fn not_told(&self) {
+        self.not_told.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// Notices that were taken, and that were given up.
+    pub fn notices(&self) -> [u64; 2] {
+        [&self.told, &self.not_told].map(|number| number.load(Ordering::Relaxed))
     }
 
     /// Batches appended.

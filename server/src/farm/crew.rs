@@ -120,6 +120,10 @@ impl Crew {
     }
 
     fn lately(&self, time: Duration) -> impl Iterator<Item = &Member> {
-        self.members.values().filter(move |m| m.state == WorkerState::Active && m.seen.elapsed() < time)
+        // The clock is read once, not for each of a thousand workers at each beat of theirs.
+        let now = Instant::now();
+        let lately =
+            move |m: &&Member| m.state == WorkerState::Active && now.saturating_duration_since(m.seen) < time;
+        self.members.values().filter(lately)
     }
 }

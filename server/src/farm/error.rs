@@ -68,6 +68,9 @@ pub enum FarmError {
     /// An idempotency key that was used for something else.
     #[error("the idempotency key was used for another request: choose a new one")]
     KeyTaken,
+    /// Nobody can be told of jobs' changes.
+    #[error("webhooks cannot be called: {0}")]
+    Messenger(String),
     /// No batch came yet.
     #[error("the job '{0}' has no picture yet: ask again later")]
     NoPicture(JobId),

@@ -18,6 +18,7 @@ pub mod lease;
 pub mod live;
 pub mod mandates;
 pub mod needs;
+pub mod notices;
 pub mod open;
 pub mod others;
 pub mod parts;
@@ -42,6 +43,7 @@ pub(crate) mod tests;
 use crate::{
     blobs::Blobs,
     store::{Store, row::JobRow},
+    webhook::Messenger,
 };
 use book::Book;
 use counters::Counters;
@@ -80,6 +82,7 @@ pub struct Farm {
     tasks: TaskTracker,
     decoders: tokio::sync::Semaphore,
     inspectors: tokio::sync::Semaphore,
+    messenger: Messenger,
     book: Mutex<Book>,
     crew: Mutex<Crew>,
     lives: Mutex<BTreeMap<JobId, Arc<Live>>>,

@@ -13,6 +13,7 @@ use super::{
 use crate::{
     blobs::{BlobFolder, Blobs},
     store::{Store, row::JobRow},
+    webhook::Messenger,
 };
 use ovtigre_proto::status::JobState;
 use std::{
@@ -39,6 +40,7 @@ impl Farm {
     ) -> Result<Arc<Self>> {
         let processors = available_parallelism().map_or(1, NonZero::get);
         let ids = super::ids::Ids::new();
+        let messenger = Messenger::new(rules.notices_to).map_err(|e| FarmError::Messenger(e.to_string()))?;
         let farm = Arc::new(Self {
             store,
             blobs,
@@ -53,6 +55,7 @@ impl Farm {
             tasks: tokio_util::task::TaskTracker::new(),
             decoders: Semaphore::new(processors),
             inspectors: Semaphore::new(INSPECTORS),
+            messenger,
             book: Mutex::default(),
             crew: Mutex::default(),
             lives: Mutex::default(),
@@ -72,6 +75,7 @@ impl Farm {
             farm.take_up(&row).await?;
         }
         farm.tasks.spawn(Arc::clone(&farm).tick());
+        farm.tasks.spawn(Arc::clone(&farm).tell());
         Ok(farm)
     }
 

@@ -1,6 +1,7 @@
 //! The farm's numbers.
 
 use super::space::Room;
+use crate::webhook::Reach;
 use std::time::Duration;
 
 /// Largest partial sum that is taken, without what its file adds to it.
@@ -57,6 +58,10 @@ pub struct Rules {
     /// A worker that gave a batch back with a reason gets none for so long; twice as long each time
     /// until it brings one.
     pub rest: Duration,
+    /// Where others may be told of jobs' changes.
+    pub notices_to: Reach,
+    /// Who could not be told is told again after so long; four times as long each time.
+    pub notice_rest: Duration,
     /// Idempotency keys are remembered so long.
     pub keys: Duration,
     /// Says how much room there is.
@@ -92,6 +97,8 @@ impl Default for Rules {
             failures: 5,
             losses: 10,
             rest: Duration::from_secs(1),
+            notices_to: Reach::Public,
+            notice_rest: Duration::from_secs(5),
             keys: Duration::from_hours(24),
             room: Room::endless(),
             reserve_bytes: 1 << 30,

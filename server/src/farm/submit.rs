@@ -6,19 +6,23 @@ use super::{
     error::{FarmError, Result, fault},
     needs::needs,
     paths::choose,
-    reach::{DEFAULT_SKY, letters, line, missing},
+    reach::{letters, line, missing},
     rules::{PARTIAL_BYTES_MAX, Rules},
     spec::JobSpec,
 };
 use crate::{
     fail_point::FailPoint,
-    store::row::{Added, IdempotencyKey, NewJob},
+    store::{
+        notice::Webhook,
+        row::{Added, IdempotencyKey, NewJob},
+    },
+    webhook,
 };
 use ovtigre_core::{
     bsdf::event::Letters,
     film::size::{Region, Size},
     path::expression::language::Language,
-    render::inspect::by_chance,
+    render::inspect::{DEFAULT_SKY, by_chance},
     settings::{CameraChoice, Environment, EnvironmentSource, Lens, Settings, Shutter},
 };
 use ovtigre_proto::{
@@ -50,6 +54,7 @@ const ASPECT_DEFAULT: f64 = 16.0 / 9.0;
 impl Farm {
     /// Checks a request; what it would become, or all its faults.
     pub async fn check(&self, request: JobRequest) -> Result<JobSpec> {
+        self.webhook(&request)?;
         let scene = request.scene.clone();
         let scene = scene.ok_or_else(|| FarmError::Request(vec![fault("/scene", "'scene' is required")]))?;
         let mut contents = match self.upload_at("/scene", &scene).await?.content {
@@ -77,7 +82,15 @@ impl Farm {
             },
         }
         let candidates = candidates(&request, &contents, &self.rules).map_err(FarmError::Request)?;
-        self.chosen_of(candidates, &contents).await
+        let mut spec = self.chosen_of(candidates, &contents).await?;
+        spec.request.webhook = spec.request.webhook.as_ref().map(webhook::shown);
+        Ok(spec)
+    }
+
+    /// Whom to tell of the job's changes.
+    fn webhook(&self, request: &JobRequest) -> Result<Option<Webhook>> {
+        let check = |wish| webhook::check(wish, self.messenger.reach());
+        request.webhook.as_ref().map(check).transpose().map_err(FarmError::Request)
     }
 
     /// An error where the owner has as many jobs under way as one may have.
@@ -122,6 +135,7 @@ impl Farm {
             return self.taken_before(before).await;
         }
         self.need_room()?;
+        let webhook = self.webhook(&request)?;
         let mut spec = self.check(request).await?;
         self.has_room_for(owner.as_deref())?;
         spec.owner = owner;
@@ -135,6 +149,7 @@ impl Farm {
             spec: serde_json::to_string(&spec).map_err(|e| FarmError::Damaged(e.to_string()))?,
             regions: spec.schedule().regions().len() as u32,
             replicates: spec.settings.replicates,
+            webhook,
         };
         FailPoint::JobBeforeRow.pass();
         match self.store.add_job(new, key).await? {

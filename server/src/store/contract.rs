@@ -42,6 +42,7 @@ fn new_job(name: &str) -> NewJob {
         spec: "{}".to_owned(),
         regions: 2,
         replicates: 2,
+        webhook: None,
     }
 }
 

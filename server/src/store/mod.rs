@@ -3,6 +3,7 @@
 //! A store has no rules beyond atomicity and its clock. What may be done is the farm's to decide.
 
 pub mod error;
+pub mod notice;
 pub mod row;
 pub mod sql;
 
@@ -12,6 +13,7 @@ pub mod contract;
 mod contract_changes;
 
 use error::Result;
+use notice::NoticeRow;
 use ovtigre_proto::{
     curve::{CurveRow, LayerError},
     id::{BlobId, JobId, LeaseId, WorkerId},
@@ -146,6 +148,13 @@ pub trait Store: Send + Sync + fmt::Debug {
     async fn token(&self, hash: &BlobId) -> Result<Option<TokenRow>>;
     /// Forgets a token; false where there was none.
     async fn remove_token(&self, id: &str) -> Result<bool>;
+
+    /// The first notice of each job, where it is due, `most` of them at most. They are due again after `time`.
+    async fn due_notices(&self, most: u32, time: Duration) -> Result<Vec<NoticeRow>>;
+    /// A notice was told, or never will be.
+    async fn end_notice(&self, sequence: i64) -> Result<()>;
+    /// A notice is due again after `time`.
+    async fn put_off_notice(&self, sequence: i64, time: Duration) -> Result<()>;
 
     /// Forgets idempotency keys older than `age`.
     async fn forget_keys(&self, age: Duration) -> Result<()>;

@@ -1,5 +1,6 @@
 //! What the store keeps, row by row.
 
+use super::notice::Webhook;
 use jiff::Timestamp;
 use ovtigre_core::film::batch::Batch;
 use ovtigre_proto::{
@@ -84,6 +85,8 @@ pub struct NewJob {
     pub regions: u32,
     /// Number of sequences of samples a region.
     pub replicates: u32,
+    /// Whom to tell of its changes.
+    pub webhook: Option<Webhook>,
 }
 
 /// A client's name for a request, so that repeating it changes nothing.

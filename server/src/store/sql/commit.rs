@@ -1,14 +1,14 @@
 //! What was brought, and the curve.
 
 use super::{
-    column::{commit as commit_row, count, from_json, job_state, parse, to_json},
+    column::{commit as commit_row, count, from_json, to_json},
     connection::Db,
     merger::require,
     query::query,
 };
 use crate::store::{
     error::Result,
-    row::{BatchKey, Brought, CommitOutcome, CommitRow, Lane, Mandate, NewCheckpoint, NewCommit},
+    row::{BatchKey, Brought, CommitRow, Lane, Mandate, NewCheckpoint},
 };
 use ovtigre_proto::{
     curve::{CurveRow, LayerError},
@@ -16,87 +16,21 @@ use ovtigre_proto::{
 };
 use std::ops::Range;
 
-/// Records a batch's sum if there is none; otherwise compares.
-pub(super) async fn commit(db: &mut Db, new: NewCommit) -> Result<CommitOutcome> {
-    let NewCommit { job, row: CommitRow { batch, hash, worker_micros }, worker, rays_per_second } = new;
-    let state = query(
-        "SELECT state, brought,
-           (SELECT next_block FROM cursor WHERE job = $1 AND region = $2 AND replicate = $3) AS next_block,
-           (SELECT worker FROM lease WHERE job = $1 AND region = $2 AND replicate = $3 AND block = $4) AS holder,
-           (SELECT count(*) FROM returned WHERE job = $1 AND region = $2 AND replicate = $3 AND block = $4) AS returned,
-           (SELECT count(*) FROM failure WHERE job = $1 AND region = $2 AND replicate = $3 AND block = $4) AS failed
-         FROM job WHERE id = $1",
-    );
-    let state = state.bind(job.as_str()).bind(batch.region).bind(batch.replicate).bind(batch.block);
-    let Some(row) = db.first(state).await? else { return Ok(CommitOutcome::NoJob) };
-    if job_state(&row.text("state")?)?.is_over() {
-        return Ok(CommitOutcome::JobOver);
-    }
-    let number = row.whole("brought")? + 1;
-    let next = row.whole_or_none("next_block")?;
-    if next.is_none_or(|next| next <= i64::from(batch.block)) {
-        return Ok(CommitOutcome::NeverHandedOut);
-    }
-    let holder = row.text_or_none("holder")?;
-    let who = worker.map(|worker| worker.to_string()).or_else(|| holder.clone()).unwrap_or_default();
-    let now = db.now().await?;
-    let insert = query(
-        "INSERT INTO commits (job, region, replicate, block, hash, worker, worker_micros, committed_ms, number)
-         VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9) ON CONFLICT DO NOTHING",
-    );
-    let insert = insert.bind(job.as_str()).bind(batch.region).bind(batch.replicate).bind(batch.block);
-    let insert = insert.bind(hash.as_str()).bind(&*who).bind(worker_micros).bind(now).bind(number);
-    if db.execute(insert).await? == 0 {
-        return compare(db, &job, batch, &hash, &who, now).await;
-    }
-    for (there, sql) in [
-        (
-            holder.is_some(),
-            "DELETE FROM lease WHERE job = $1 AND region = $2 AND replicate = $3 AND block = $4",
-        ),
-        (
-            row.truth("returned")?,
-            "DELETE FROM returned WHERE job = $1 AND region = $2 AND replicate = $3 AND block = $4",
-        ),
-        (
-            row.truth("failed")?,
-            "DELETE FROM failure WHERE job = $1 AND region = $2 AND replicate = $3 AND block = $4",
-        ),
-    ] {
-        if !there {
-            continue;
-        }
-        let delete = query(sql).bind(job.as_str());
-        db.execute(delete.bind(batch.region).bind(batch.replicate).bind(batch.block)).await?;
-    }
-    let counted = query("UPDATE job SET brought = $2 WHERE id = $1").bind(job.as_str()).bind(number);
-    db.execute(counted).await?;
-    let done = "UPDATE worker SET batches_done = batches_done + 1, rays_per_second = $2 WHERE id = $1";
-    db.execute(query(done).bind(who).bind(rays_per_second)).await?;
-    Ok(CommitOutcome::First)
-}
-
-async fn compare(
+/// Remembers a sum that differs from the one that counts.
+pub(super) async fn disagree(
     db: &mut Db,
     job: &JobId,
     batch: BatchKey,
     hash: &BlobId,
     worker: &str,
     now: i64,
-) -> Result<CommitOutcome> {
-    let kept = "SELECT hash FROM commits WHERE job = $1 AND region = $2 AND replicate = $3 AND block = $4";
-    let kept = query(kept).bind(job.as_str()).bind(batch.region).bind(batch.replicate).bind(batch.block);
-    let kept: BlobId = parse(&db.one(kept).await?, "hash")?;
-    if kept == *hash {
-        return Ok(CommitOutcome::Same);
-    }
+) -> Result<()> {
     let insert = query(
         "INSERT INTO disagreement (job, region, replicate, block, hash, worker, seen_ms)
          VALUES ($1, $2, $3, $4, $5, $6, $7) ON CONFLICT DO NOTHING",
     );
     let insert = insert.bind(job.as_str()).bind(batch.region).bind(batch.replicate).bind(batch.block);
-    db.execute(insert.bind(hash.as_str()).bind(worker).bind(now)).await?;
-    Ok(CommitOutcome::Differs { kept })
+    db.execute(insert.bind(hash.as_str()).bind(worker).bind(now)).await.map(drop)
 }
 
 /// What was brought of some blocks of a lane.

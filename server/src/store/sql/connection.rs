@@ -61,7 +61,7 @@ fn for_sqlite(query: Query) -> Bound<'static, Sqlite, SqliteArguments> {
 }
 
 fn for_postgres(query: Query) -> Bound<'static, Postgres, PgArguments> {
-    query.values.into_iter().fold(sqlx::query(query.sql), |bound, value| match value {
+    query.values.into_iter().fold(sqlx::query(query.postgres), |bound, value| match value {
         // PostgreSQL has no text with a zero in it.
         Value::Text(text) => bound.bind(text.map(|text| text.replace('\0', "\u{fffd}"))),
         Value::Whole(number) => bound.bind(number),

@@ -3,6 +3,7 @@
 use super::{
     column::{batch, count, job_state, parse, time},
     connection::{Db, Row},
+    notice,
     query::query,
 };
 use crate::store::{
@@ -78,6 +79,7 @@ pub(super) async fn extend_job(db: &mut Db, id: &JobId, version: u64, to: Extens
     let Some(row) = db.first(row).await? else { return Ok(false) };
     if job_state(&row.text("state")?)?.is_over() {
         go_on(db, id, &to, now).await?;
+        notice::note(db, id.as_str(), now).await?;
     } else {
         let back = query("UPDATE cursor SET next_block = $2 WHERE job = $1 AND next_block > $2");
         db.execute(back.bind(id.as_str()).bind(to.whole)).await?;

@@ -4,6 +4,7 @@ use super::{
     column::{count, from_json, job_state, parse, time, to_json},
     connection::{Db, Row},
     merger::require,
+    notice,
     query::query,
 };
 use crate::store::{
@@ -67,6 +68,9 @@ pub(super) async fn add(db: &mut Db, job: NewJob, key: Option<IdempotencyKey>) -
                 query("INSERT INTO cursor (job, region, replicate, next_block) VALUES ($1, $2, $3, 0)");
             db.execute(cursor.bind(job.id.as_str()).bind(region).bind(replicate)).await?;
         }
+    }
+    if let Some(webhook) = job.webhook {
+        notice::add_webhook(db, &job.id, webhook).await?;
     }
     Ok(Added::New)
 }
@@ -185,6 +189,7 @@ pub(super) async fn change(db: &mut Db, id: &JobId, version: u64, change: JobCha
     }
     if let Some(state) = change.state {
         set_state(db, id, state, now).await?;
+        notice::note(db, id.as_str(), now).await?;
     }
     if let Some(settlement) = change.settlement {
         settle(db, id, settlement).await?;
@@ -244,6 +249,8 @@ async fn forget(db: &mut Db, id: &JobId, kept: Kept) -> Result<()> {
         "DELETE FROM commits WHERE job = $1",
         "DELETE FROM checkpoint WHERE job = $1",
         "DELETE FROM idempotency WHERE job = $1",
+        "DELETE FROM notice WHERE job = $1",
+        "DELETE FROM webhook WHERE job = $1",
     ];
     let sums = if kept >= Kept::Curve { sums } else { &[] };
     let shown = if kept >= Kept::Nothing { shown } else { &[] };

@@ -4,11 +4,12 @@ use super::{
     column::{batch, commit, count, lease, millis},
     connection::{Db, Row},
     merger::require,
+    notice,
     query::query,
 };
 use crate::store::{
     error::Result,
-    row::{BatchKey, Claim, Lane, LeaseRow, Ledger, Mandate, Released, Unclaimed},
+    row::{BatchKey, Lane, LeaseRow, Ledger, Mandate, Released, Unclaimed},
 };
 use ovtigre_proto::id::{JobId, LeaseId, WorkerId};
 use std::time::Duration;
@@ -52,57 +53,16 @@ pub(super) async fn returned(db: &mut Db) -> Result<Vec<(JobId, BatchKey)>> {
     rows.iter().map(|row| Ok((super::column::parse(row, "job")?, batch(row)?))).collect()
 }
 
-/// Hands out each batch that may be.
-pub(super) async fn claim(db: &mut Db, claims: Vec<Claim>, time: Duration) -> Result<Vec<bool>> {
-    let now = db.now().await?;
-    let mut claimed = Vec::with_capacity(claims.len());
-    for one in claims {
-        claimed.push(claim_one(db, &one, now, millis(time)).await?);
-    }
-    Ok(claimed)
-}
-
-async fn claim_one(db: &mut Db, claim: &Claim, now: i64, time: i64) -> Result<bool> {
-    let Claim { lease, job, batch: BatchKey { block, replicate, region }, worker } = claim;
-    let state = query(
-        "SELECT state,
-           (SELECT count(*) FROM returned WHERE job = $1 AND region = $2 AND replicate = $3 AND block = $4) AS returned
-         FROM job WHERE id = $1",
+/// The first batch of a job that waits in line is handed out.
+pub(super) async fn begin(db: &mut Db, job: &str, now: i64) -> Result<()> {
+    let begun = query(
+        "UPDATE job SET state = 'running', version = version + 1, started_ms = coalesce(started_ms, $2)
+         WHERE id = $1 AND state = 'queued'",
     );
-    let state = state.bind(job.as_str()).bind(*region).bind(*replicate).bind(*block);
-    let Some(row) = db.first(state).await? else { return Ok(false) };
-    let state = row.text("state")?;
-    if !matches!(&*state, "queued" | "running") {
-        return Ok(false);
+    if db.execute(begun.bind(job).bind(now)).await? > 0 {
+        notice::note(db, job, now).await?;
     }
-    if row.truth("returned")? {
-        let returned =
-            query("DELETE FROM returned WHERE job = $1 AND region = $2 AND replicate = $3 AND block = $4");
-        db.execute(returned.bind(job.as_str()).bind(*region).bind(*replicate).bind(*block)).await?;
-    } else {
-        let next = query(
-            "UPDATE cursor SET next_block = next_block + 1
-             WHERE job = $1 AND region = $2 AND replicate = $3 AND next_block = $4",
-        );
-        let next = next.bind(job.as_str()).bind(*region).bind(*replicate).bind(*block);
-        if db.execute(next).await? == 0 {
-            return Ok(false);
-        }
-    }
-    let insert = query(
-        "INSERT INTO lease (id, job, region, replicate, block, worker, granted_ms, ends_ms)
-         VALUES ($1, $2, $3, $4, $5, $6, $7, $8)",
-    );
-    let insert = insert.bind(lease.as_str()).bind(job.as_str()).bind(*region).bind(*replicate).bind(*block);
-    db.execute(insert.bind(worker.as_str()).bind(now).bind(now + time)).await?;
-    if state == "queued" {
-        let begun = query(
-            "UPDATE job SET state = 'running', version = version + 1, started_ms = coalesce(started_ms, $2)
-             WHERE id = $1",
-        );
-        db.execute(begun.bind(job.as_str()).bind(now)).await?;
-    }
-    Ok(true)
+    Ok(())
 }
 
 /// Gives those leases `time` from now that the worker still has.

@@ -7,9 +7,11 @@ mod column;
 mod commit;
 mod connection;
 mod control;
+mod gathered;
 mod job;
 mod ledger;
 mod merger;
+mod notice;
 mod open;
 mod query;
 #[cfg(test)]
@@ -20,6 +22,7 @@ mod writer;
 use super::{
     Sharing, Store,
     error::{Result, StoreError},
+    notice::NoticeRow,
     row::{
         Added, BatchKey, Brought, Claim, CommitOutcome, CommitRow, Counts, Extension, IdempotencyKey,
         JobChange, JobFilter, JobHead, JobRow, Lane, Ledger, Mandate, NewCheckpoint, NewCommit, NewJob,
@@ -147,7 +150,7 @@ impl Store for Sql {
     }
 
     async fn claim(&self, claims: Vec<Claim>, time: Duration) -> Result<Vec<bool>> {
-        self.writer.write(move |db| Box::pin(ledger::claim(db, claims, time))).await
+        self.writer.claim(claims, time).await
     }
 
     async fn renew(&self, worker: &WorkerId, leases: Vec<LeaseId>, time: Duration) -> Result<Vec<LeaseId>> {
@@ -170,7 +173,7 @@ impl Store for Sql {
     }
 
     async fn commit(&self, commit: NewCommit) -> Result<CommitOutcome> {
-        self.writer.write(|db| Box::pin(commit::commit(db, commit))).await
+        self.writer.commit(commit).await
     }
 
     async fn commits(&self, job: &JobId, lane: Lane, blocks: Range<u32>) -> Result<Vec<CommitRow>> {
@@ -313,6 +316,21 @@ impl Store for Sql {
     async fn free_merge(&self, job: &JobId) -> Result<()> {
         let job = job.clone();
         self.writer.write(move |db| Box::pin(async move { control::free_merge(db, &job).await })).await
+    }
+
+    async fn due_notices(&self, most: u32, time: Duration) -> Result<Vec<NoticeRow>> {
+        if !notice::any_due(&mut self.reader().await?).await? {
+            return Ok(Vec::new());
+        }
+        self.writer.write(move |db| Box::pin(notice::take(db, most, time))).await
+    }
+
+    async fn end_notice(&self, sequence: i64) -> Result<()> {
+        self.writer.write(move |db| Box::pin(notice::end(db, sequence))).await
+    }
+
+    async fn put_off_notice(&self, sequence: i64, time: Duration) -> Result<()> {
+        self.writer.write(move |db| Box::pin(notice::put_off(db, sequence, time))).await
     }
 
     async fn forget_keys(&self, age: Duration) -> Result<()> {

@@ -43,15 +43,22 @@ values! {
 /// A statement with its values.
 #[derive(Clone, Debug)]
 pub(super) struct Query {
-    /// What both databases read alike: places are `$1`, `$2` …, numbers BIGINT or REAL.
+    /// What SQLite reads: places are `$1`, `$2` …, numbers BIGINT or REAL.
     pub(super) sql: &'static str,
+    /// What PostgreSQL reads; the same but for lists.
+    pub(super) postgres: &'static str,
     /// Place by place.
     pub(super) values: Vec<Value>,
 }
 
 /// A statement without values yet.
 pub(super) fn query(sql: &'static str) -> Query {
-    Query { sql, values: Vec::new() }
+    both(sql, sql)
+}
+
+/// A statement that SQLite and PostgreSQL read differently.
+pub(super) fn both(sqlite: &'static str, postgres: &'static str) -> Query {
+    Query { sql: sqlite, postgres, values: Vec::new() }
 }
 
 impl Query {

@@ -1,9 +1,12 @@
 //! The one writer: whatever waits while a transaction is made durable goes into the next, together.
 
-use super::{connection::Db, open::Source, query::query};
+use super::{column::millis, connection::Db, gathered, open::Source, query::query};
 use crate::{
     fail_point::FailPoint,
-    store::error::{Result, StoreError},
+    store::{
+        error::{Result, StoreError},
+        row::{Claim, CommitOutcome, NewCommit},
+    },
 };
 use futures::future::BoxFuture;
 use std::{
@@ -33,10 +36,23 @@ enum Keep {
     No,
 }
 
+/// Whom to tell.
+type Asker<T> = oneshot::Sender<Result<T>>;
+
+/// What waits to be written.
+enum Waiting {
+    /// A change of its own.
+    Change(Change),
+    /// Batches to hand out for a while: all of a group are, together.
+    Claims(Vec<Claim>, Duration, Asker<Vec<bool>>),
+    /// A sum that is brought: all of a group are taken together.
+    Commit(NewCommit, Asker<CommitOutcome>),
+}
+
 /// Where changes are handed in.
 #[derive(Debug)]
 pub(super) struct Writer {
-    changes: Mutex<Option<mpsc::Sender<Change>>>,
+    changes: Mutex<Option<mpsc::Sender<Waiting>>>,
     task: Mutex<Option<JoinHandle<()>>>,
 }
 
@@ -66,8 +82,24 @@ impl Writer {
                 (keep, tell)
             })
         });
+        self.ask(Waiting::Change(change), told).await
+    }
+
+    /// Hands out each batch that may be, for `time`.
+    pub(super) async fn claim(&self, claims: Vec<Claim>, time: Duration) -> Result<Vec<bool>> {
+        let (tell, told) = oneshot::channel();
+        self.ask(Waiting::Claims(claims, time, tell), told).await
+    }
+
+    /// Records a batch's sum if there is none, otherwise compares.
+    pub(super) async fn commit(&self, new: NewCommit) -> Result<CommitOutcome> {
+        let (tell, told) = oneshot::channel();
+        self.ask(Waiting::Commit(new, tell), told).await
+    }
+
+    async fn ask<T>(&self, waiting: Waiting, told: oneshot::Receiver<Result<T>>) -> Result<T> {
         let changes = self.changes.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        changes.ok_or(StoreError::Closed)?.send(change).await.map_err(|_| StoreError::Closed)?;
+        changes.ok_or(StoreError::Closed)?.send(waiting).await.map_err(|_| StoreError::Closed)?;
         told.await.map_err(|_| StoreError::Commit("the group it was in was given up".to_owned()))?
     }
 
@@ -83,7 +115,7 @@ impl Writer {
     }
 }
 
-async fn write_all(connection: Db, source: Source, mut waiting: mpsc::Receiver<Change>) {
+async fn write_all(connection: Db, source: Source, mut waiting: mpsc::Receiver<Waiting>) {
     let mut connection = Some(connection);
     while let Some(first) = waiting.recv().await {
         let mut group = vec![first];
@@ -106,7 +138,7 @@ async fn write_all(connection: Db, source: Source, mut waiting: mpsc::Receiver<C
             };
         }
         let Some(db) = connection.as_mut() else { continue };
-        let written = tokio::time::timeout(PATIENCE, write_group(db, group)).await;
+        let written = tokio::time::timeout(PATIENCE, write_group(db, gather(group))).await;
         if !matches!(written, Ok(Health::Good)) {
             connection = connection.take().filter(|_| source.is_file() && written.is_ok());
         }
@@ -116,6 +148,76 @@ async fn write_all(connection: Db, source: Source, mut waiting: mpsc::Receiver<C
     {
         tracing::warn!(%error, "the database did not close cleanly");
     }
+}
+
+/// The changes of a group, with all claims as one and all sums as one: each costs some statements, not
+/// each of what is in it.
+fn gather(group: Vec<Waiting>) -> Vec<Change> {
+    let mut changes = Vec::new();
+    let (mut claims, mut claimers) = (Vec::new(), Vec::new());
+    let (mut commits, mut bringers) = (Vec::new(), Vec::new());
+    for waiting in group {
+        match waiting {
+            Waiting::Change(change) => changes.push(change),
+            Waiting::Claims(asked, time, asker) => {
+                claimers.push((asked.len(), asker));
+                claims.extend(asked.into_iter().map(|claim| (claim, time)));
+            }
+            Waiting::Commit(new, asker) => {
+                commits.push(new);
+                bringers.push((1, asker));
+            }
+        }
+    }
+    if !commits.is_empty() {
+        changes.push(Box::new(move |db| {
+            Box::pin(async move {
+                let one = |outcomes: Vec<_>| outcomes.into_iter().next();
+                told(gathered::commit(db, &commits).await, bringers, one)
+            })
+        }));
+    }
+    if !claims.is_empty() {
+        changes
+            .push(Box::new(move |db| Box::pin(async move { told(claim(db, claims).await, claimers, Some) })));
+    }
+    changes
+}
+
+async fn claim(db: &mut Db, claims: Vec<(Claim, Duration)>) -> Result<Vec<bool>> {
+    let now = db.now().await?;
+    let claims: Vec<_> = claims.into_iter().map(|(claim, time)| (claim, now + millis(time))).collect();
+    gathered::claim(db, &claims).await
+}
+
+/// Whether what was done together is kept, and how each of those who asked for some of it is told of its part.
+fn told<R, T>(
+    done: Result<Vec<R>>,
+    askers: Vec<(usize, Asker<T>)>,
+    part: impl Fn(Vec<R>) -> Option<T> + Send + 'static,
+) -> (Keep, Tell)
+where
+    R: Send + 'static,
+    T: Send + 'static,
+{
+    let keep = if done.is_ok() { Keep::Yes } else { Keep::No };
+    let tell: Tell = Box::new(move |durable| {
+        let mut done = done.and_then(|all| durable.map(|()| all.into_iter()));
+        for (count, asker) in askers {
+            let its = match &mut done {
+                Ok(all) => part(all.by_ref().take(count).collect()),
+                Err(error) => {
+                    let _ = asker.send(Err(StoreError::Commit(error.to_string())));
+                    continue;
+                }
+            };
+            // Without a part its asker hears that the group was given up.
+            if let Some(its) = its {
+                let _ = asker.send(Ok(its));
+            }
+        }
+    });
+    (keep, tell)
 }
 
 /// Whether a connection can still be used.
