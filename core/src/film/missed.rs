@@ -96,7 +96,7 @@ mod tests {
     #[test]
     fn what_all_replicates_of_the_other_show_is_missed_by_the_one_that_is_darker() {
         // Every fourth row of blocks is three times as bright in the other: √(1/4 · (2/3)²) but for ε.
-        let bright = |i: usize, _: u32| if i / 48 / 4 % 4 == 0 { 2.0 } else { 0.0 };
+        let bright = |i: usize, _: u32| if (i / 48 / 4).is_multiple_of(4) { 2.0 } else { 0.0 };
         let [dark, other] = [picture(1, [0.9, 1.1], |_, _| 0.0), picture(2, [0.9, 1.1], bright)];
         assert!((missed(&dark, &other) - 1.0 / 3.0).abs() < 0.01, "{}", missed(&dark, &other));
         assert!(missed(&other, &dark) < 0.01, "{}", missed(&other, &dark));
