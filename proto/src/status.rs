@@ -8,7 +8,8 @@ use crate::{
 };
 use jiff::Timestamp;
 use ovtigre_core::{
-    film::size::Region, path::reach::Unreachable, radiosity::report::RadiosityReport, settings::Settings,
+    film::size::Region, path::reach::Unreachable, radiosity::report::RadiosityReport, render::pilot::Pilot,
+    settings::Settings,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -109,6 +110,9 @@ pub struct JobStatus {
     pub method: String,
     /// Why that way.
     pub method_reason: String,
+    /// What was tried to choose it, where it was left open and trying paid.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pilot: Option<Pilot>,
     /// The path expression.
     pub paths: String,
     /// The class of processors whose bits its sums have, once its first batch was handed out.

@@ -47,13 +47,13 @@ struct Kind {
 fn kinds() -> Vec<Kind> {
     let kind = |size: u32, samples: u32, method: Method, flags: &[&'static str]| {
         let wish = Settings { bounces: Some(2), method, ..settings(size, size, 4) };
-        let flags = [flags, &["--bounces", "2"]].concat();
+        let flags = [flags, &["--bounces", "2", "--method", method.name()]].concat();
         Kind { flags, samples, expected: undisturbed(&room(), &wish, samples) }
     };
     vec![
         kind(4, 4 * 1024, Method::Path, &["--size", "4x4", "--samples", "4096"]),
         kind(12, 4 * 1024, Method::Path, &["--size", "12x12", "--samples", "4096"]),
-        kind(8, 4 * 1024, Method::Light, &["--size", "8x8", "--samples", "4096", "--method", "light"]),
+        kind(8, 4 * 1024, Method::Light, &["--size", "8x8", "--samples", "4096"]),
     ]
 }
 

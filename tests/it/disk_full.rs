@@ -45,7 +45,7 @@ fn assert_survives_a_full_disk(reserve: &str) {
     let (scene, filler) = (folder.path().join("scene.glb"), inside.join("filler"));
     fs::write(&scene, room()).unwrap();
     let samples = SAMPLES.to_string();
-    let flags = ["--size", "8x8", "--samples", &samples, "--bounces", "2"];
+    let flags = ["--size", "8x8", "--samples", &samples, "--bounces", "2", "--method", "path"];
     let submit = [&["submit", scene.to_str().unwrap()], &flags[..]].concat();
     let job = farm.client(&submit).trim().to_owned();
     let worker = farm.worker();

@@ -15,6 +15,8 @@ use std::{fs, path::Path};
 
 /// Samples a pixel, all four replicates together.
 const SAMPLES: u32 = 256;
+/// Said, as a method would else be chosen.
+const BY_PATH: [&str; 2] = ["--method", "path"];
 
 fn plain() -> Settings {
     settings(96, 54, 4)
@@ -91,7 +93,7 @@ fn assert_worker_may_die(
 
 #[test]
 fn a_killed_worker_and_a_late_one_change_no_byte() {
-    assert_worker_may_die(&room(), &plain(), SAMPLES, &[]);
+    assert_worker_may_die(&room(), &plain(), SAMPLES, &BY_PATH);
 }
 
 #[test]
@@ -139,7 +141,7 @@ fn a_killed_farm_goes_on_where_it_was() {
     let folder = tempfile::tempdir().unwrap();
     let data = folder.path().join("farm");
     let farm = Farm::start(&data);
-    let job = submit(&farm, folder.path(), &room(), &plain(), SAMPLES, &[]);
+    let job = submit(&farm, folder.path(), &room(), &plain(), SAMPLES, &BY_PATH);
     let worker = farm.worker();
     let before = farm.wait(&job, |j| batches(j) > 1);
     farm.kill();
@@ -163,7 +165,7 @@ fn assert_a_server_may_die(name: &str, dies: usize) {
     let folder = tempfile::tempdir().unwrap();
     let server = |n: usize| Farm::start_with(&folder.path().join(format!("farm-{n}")), &shared.flags());
     let mut farms = vec![server(0), server(1)];
-    let job = submit(&farms[0], folder.path(), &room(), &plain(), SAMPLES, &[]);
+    let job = submit(&farms[0], folder.path(), &room(), &plain(), SAMPLES, &BY_PATH);
     let (first, _second) = (farms[0].worker(), farms[1].worker());
     let then = farms[1].wait(&job, |j| batches(j) > 0);
     first.kill();

@@ -2,6 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on panics")]
 
+mod auto;
 mod bad_input;
 mod calibration;
 mod caustics;
@@ -21,6 +22,7 @@ mod page;
 mod photons;
 mod radiosity;
 mod same_bits;
+mod slope;
 mod stability;
 mod techniques;
 mod tidy;

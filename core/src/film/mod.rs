@@ -9,6 +9,7 @@ pub mod error;
 pub mod estimate;
 pub mod exr;
 pub mod invalid;
+pub mod missed;
 pub mod reference;
 pub mod schedule;
 pub mod shares;

@@ -3,6 +3,7 @@
 pub mod batch;
 pub mod inspect;
 mod passes;
+pub mod pilot;
 pub mod prepare;
 pub mod profile;
 pub mod progress;

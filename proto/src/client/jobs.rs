@@ -22,6 +22,8 @@ use std::time::Duration;
 
 const IDEMPOTENCY_KEY: HeaderName = HeaderName::from_static("idempotency-key");
 const PREFER: HeaderName = HeaderName::from_static("prefer");
+/// Time that a farm may take to try methods on a scene before it takes a job: seconds of a processor that may be busy.
+const TRIAL_MAX: Duration = Duration::from_mins(1);
 
 /// Which picture of a job.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -37,7 +39,7 @@ pub struct Development {
 impl Client {
     /// Submits a job. `key` makes a repeated call the same job.
     pub async fn submit(&self, request: &JobRequest, key: &str) -> Result<JobStatus, ClientError> {
-        let call = Call::new(Method::POST, route::JOBS).json(request);
+        let call = Call::new(Method::POST, route::JOBS).json(request).wait(TRIAL_MAX);
         self.send(&call.header(IDEMPOTENCY_KEY, key).repeat(Repeat::Harmless)).await?.json().await
     }
 

@@ -17,7 +17,7 @@ use axum::{
     http::{HeaderMap, HeaderValue, StatusCode, header},
     response::{IntoResponse as _, Response},
 };
-use ovtigre_core::{film::size::Region, settings::Settings};
+use ovtigre_core::{film::size::Region, render::pilot::Pilot, settings::Settings};
 use ovtigre_proto::{
     id::JobId,
     job::{JobPatch, JobRequest},
@@ -50,6 +50,8 @@ pub struct DryRun {
     batches_asked: u64,
     method: &'static str,
     method_reason: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pilot: Option<Pilot>,
     paths: String,
     warnings: Vec<String>,
 }
@@ -64,6 +66,7 @@ impl From<JobSpec> for DryRun {
             paths: spec.settings.paths.clone(),
             settings: spec.settings,
             method_reason: spec.method_reason,
+            pilot: spec.pilot,
             warnings: spec.warnings,
         }
     }

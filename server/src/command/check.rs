@@ -2,7 +2,7 @@
 
 use super::{exit::Outcome, scene_file, table, terminal, words};
 use clap::Args;
-use ovtigre::farm::reach::line;
+use ovtigre::farm::reach::{line, lost};
 use ovtigre_core::{
     gltf::limits::Limits,
     path::{
@@ -32,7 +32,9 @@ struct Document<'a> {
     contents: &'a ovtigre_core::gltf::report::Report,
     needs: &'a [String],
     leaves_out: &'a [String],
-    /// By a render with default flags.
+    /// What a render with default flags chooses from.
+    methods: Vec<&'static str>,
+    /// By any of them.
     unreachable: Vec<Unreachable>,
     warnings: Vec<Warning<'a>>,
 }
@@ -58,26 +60,46 @@ impl Check {
 }
 
 fn document(contents: &Contents) -> Document<'_> {
+    let (open, unreachable) = methods(contents);
     Document {
         contents: &contents.report,
         needs: &contents.needs,
         leaves_out: &contents.leaves_out,
-        unreachable: not_made(contents),
+        methods: open.into_iter().map(Method::name).collect(),
+        unreachable,
         warnings: (contents.warnings.iter())
             .map(|w| Warning { pointer: &w.pointer, detail: &w.detail })
             .collect(),
     }
 }
 
-/// Paths that a render with default flags asks for and does not make.
-fn not_made(contents: &Contents) -> Vec<Unreachable> {
+/// Methods that a render with default flags chooses from.
+const OPEN: [Method; 3] = [Method::Path, Method::Bidirectional, Method::Light];
+
+/// Of them those that make the most of the paths that are asked for, and what they do not make.
+fn methods(contents: &Contents) -> (Vec<Method>, Vec<Unreachable>) {
     let language = Language::compile(&[FULL]).expect("the default is an expression");
     let around = contents.surroundings(&language.tags().collect::<Vec<_>>());
-    unreachable(&language, Method::Path, &around, None)
+    let by = OPEN.map(|method| (method, unreachable(&language, method, &around, None)));
+    let (_, fewest) = by.iter().min_by_key(|(_, missing)| lost(missing)).expect("there are methods");
+    let best = by.iter().filter(|(_, missing)| lost(missing) == lost(fewest));
+    (best.map(|(method, _)| *method).collect(), fewest.clone())
+}
+
+/// What a render with default flags is made by.
+fn method(open: &[Method]) -> String {
+    match open {
+        [one] => format!("{}: it makes paths that no other method makes", one.name()),
+        some => {
+            let names: Vec<&str> = some.iter().map(|method| method.name()).collect();
+            format!("{}: a trial tells, where the job is large enough", names.join(" or "))
+        }
+    }
 }
 
 fn show(contents: &Contents) {
     let report = &contents.report;
+    let (open, not_made) = methods(contents);
     let [points, spots, suns] = contents.punctual;
     let some = |count: u64, what: &str| if count > 0 { format!("{count} {what}") } else { String::new() };
     let or_none = |list: String, none: &str| if list.is_empty() { none.to_owned() } else { list };
@@ -104,9 +126,10 @@ fn show(contents: &Contents) {
         ("needs", words::list(&contents.needs)),
         ("leaves out", words::list(&contents.leaves_out)),
         ("dropped", dropped),
+        ("method", method(&open)),
     ]);
-    for missing in not_made(contents) {
-        terminal::result(&format!("warning: {}", line(&missing)));
+    for missing in &not_made {
+        terminal::result(&format!("warning: {}", line(missing)));
     }
     for warning in &contents.warnings {
         let pointer = if warning.pointer.is_empty() { "/" } else { &warning.pointer };

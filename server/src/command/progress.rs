@@ -35,6 +35,7 @@ impl Progress {
     pub(crate) fn show(&mut self, status: &JobStatus) {
         if !self.warned {
             self.warned = true;
+            self.remark(&format!("method: {}, {}", status.method, status.method_reason));
             for warning in &status.warnings {
                 self.remark(&format!("warning: {warning}"));
             }

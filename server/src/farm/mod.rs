@@ -4,6 +4,7 @@ pub mod append;
 pub mod audit;
 pub mod book;
 pub mod checkpoint;
+mod choice;
 pub mod commit;
 pub mod control;
 pub mod counters;

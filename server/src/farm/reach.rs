@@ -56,6 +56,11 @@ pub fn letters(scene: &SceneContents) -> Letters {
     scene.letters.iter().filter_map(letter).map(Letters::of).fold(Letters::NONE, Letters::union)
 }
 
+/// How many of the words that are asked for are not made, at least one for each kind of light that has some.
+pub fn lost(missing: &[Unreachable]) -> u64 {
+    missing.iter().map(|paths| paths.counts()[0].max(1)).sum()
+}
+
 /// One line of it for people.
 pub fn line(missing: &Unreachable) -> String {
     let Unreachable { light, paths, why, reached_by, shares } = missing;

@@ -7,6 +7,7 @@ use ovtigre_core::{
         size::{Region, Size},
     },
     path::reach::Unreachable,
+    render::pilot::Pilot,
     settings::{CameraChoice, FULL, Gloss, Method, Settings, Shadows, Shutter, Weights},
 };
 use ovtigre_proto::{id::BlobId, job::JobRequest, needs::Needs};
@@ -43,6 +44,9 @@ pub struct JobSpec {
     pub needs: Needs,
     /// Why the method was chosen.
     pub method_reason: String,
+    /// What was tried to choose it, if anything was.
+    #[serde(default)]
+    pub pilot: Option<Pilot>,
     /// Paths that are asked for and that no technique of the method makes.
     #[serde(default)]
     pub unreachable: Vec<Unreachable>,

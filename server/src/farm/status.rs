@@ -82,6 +82,7 @@ impl Farm {
             eta_seconds,
             method: spec.settings.method.name().to_owned(),
             method_reason: spec.method_reason,
+            pilot: spec.pilot,
             class: row.class.clone(),
             paths: shown(&spec.settings.paths).to_owned(),
             unreachable: spec.unreachable,

@@ -2,6 +2,7 @@
 
 use super::{
     Farm,
+    choice::candidates,
     error::{FarmError, Result, fault},
     needs::needs,
     paths::choose,
@@ -80,7 +81,8 @@ impl Farm {
                 }
             },
         }
-        let mut spec = resolve(request, &contents, &self.rules).map_err(FarmError::Request)?;
+        let candidates = candidates(&request, &contents, &self.rules).map_err(FarmError::Request)?;
+        let mut spec = self.chosen_of(candidates, &contents).await?;
         spec.request.webhook = spec.request.webhook.as_ref().map(webhook::shown);
         Ok(spec)
     }
@@ -183,7 +185,7 @@ fn shares(request: &JobRequest, samples: u32, replicates: u32, note: &mut impl F
     }
 }
 
-/// A request with every default resolved, or all its faults.
+/// A request with every default resolved, or all its faults. An open method is `path`.
 pub fn resolve(
     request: JobRequest,
     scene: &SceneContents,
@@ -253,6 +255,7 @@ pub fn resolve(
         by_chance: by_chance(chosen.method, letters(scene), scene.brightest),
         needs: Needs::default(),
         method_reason: chosen.reason.to_owned(),
+        pilot: None,
         unreachable,
         warnings,
         request,

@@ -1,0 +1,346 @@
+//! A pilot: small pictures by several methods, which tell the one that needs the least work for an error.
+//!
+//! Work is counted and not timed, so that the choice is the same on every machine.
+
+use crate::film::append::Prefix;
+use crate::film::batch::{Batch, Block};
+use crate::film::certificate::Look;
+use crate::film::error::estimate;
+use crate::film::missed::missed;
+use crate::film::size::{Region, Size};
+use crate::render::batch::{RenderError, render};
+use crate::render::prepare::{PrepareError, Prepared, prepare};
+use crate::render::progress::Progress;
+use crate::settings::{Method, Settings};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// Share of a job's work that a pilot may take.
+const SHARE: f64 = 0.02;
+/// Sequences of each method.
+const REPLICATES: u32 = 8;
+/// Blocks of a sequence: each but the first doubles its samples.
+const BLOCKS_MAX: u32 = 4;
+/// Fewest pixels of a pilot's pictures.
+const PIXELS_MIN: f64 = 64.0;
+/// Most pixels of a pilot's pictures. They should be as small as the job's: edges are noise that all methods share, and there is
+/// the more of it the larger pixels are, which speaks for the method with the cheapest samples.
+const PIXELS_MAX: f64 = 8192.0;
+/// A sample by each of all methods in samples of `path`, where nothing is known yet.
+const ALL_METHODS: f64 = 6.0;
+/// Reading a triangle and building its part of a tree, in samples of `path`.
+const TRIANGLE: f64 = 0.5;
+/// Samples of `path` that a second of run time is taken for.
+const SAMPLES_A_SECOND: f64 = 1e5;
+/// Triangles that are read, at most: they are in memory meanwhile.
+const TRIANGLES_MAX: u64 = 1 << 20;
+/// Rays of a sample of the first method beyond which joining all vertices of two subpaths is not tried.
+const PATH_RAYS_MAX: f64 = 64.0;
+/// Work of a pilot, at most: a few seconds of a thread.
+const WORK_MAX: f64 = 4e6;
+/// Another method is taken where it needs less than so many times the first one's work.
+const GAIN: f64 = 0.95;
+/// The same where the first one meets light by chance: what few samples tell of its error is mostly too little. In the bundled room and
+/// in a caustic, pilots said 1.0 and 1.2, and long renders 0.3 and 0.004.
+const GAIN_BY_CHANCE: f64 = 1.5;
+
+/// How eye subpaths come to light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Chance {
+    /// By next events, which miss nothing.
+    Never,
+    /// Some of it by chance, behind glossy or specular surfaces.
+    Sometimes,
+}
+
+/// What a job is, as far as a pilot has to know.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// What is rendered, by any method.
+    pub settings: Settings,
+    /// Pixels that are rendered.
+    pub region: Region,
+    /// Samples a pixel over all replicates, at most.
+    pub samples: u32,
+    /// Relative error to stop at.
+    pub error_target: Option<f64>,
+    /// Seconds of run time to stop after.
+    pub seconds: Option<f64>,
+    /// Triangles that are read.
+    pub triangles: u64,
+    /// Whether the first of the methods comes to some light by chance only.
+    pub chance: Chance,
+    /// Methods that make the picture; the first is taken where no other is better.
+    pub methods: Vec<Method>,
+}
+
+impl Plan {
+    /// Samples of the job over all pixels, at most.
+    fn job(&self) -> f64 {
+        let asked = self.region.pixels() as f64 * f64::from(self.samples);
+        self.seconds.map_or(asked, |seconds| asked.min(seconds * SAMPLES_A_SECOND))
+    }
+
+    /// Pixels that may be tried: two blocks of them, so that there is something to go by.
+    fn pixels(&self) -> f64 {
+        SHARE * self.job() / (2.0 * f64::from(REPLICATES) * ALL_METHODS)
+    }
+
+    /// Whether there is work enough for a pilot, before anything is read.
+    pub fn check(&self) -> Result<(), NoPilot> {
+        let reading = TRIANGLE * self.triangles as f64;
+        if self.pixels() < PIXELS_MIN {
+            Err(NoPilot::TooLittle)
+        } else if self.triangles > TRIANGLES_MAX || reading > 0.5 * SHARE * self.job() {
+            Err(NoPilot::TooLarge)
+        } else {
+            Ok(())
+        }
+    }
+}
+
+/// Why nothing was tried.
+#[derive(Debug, thiserror::Error)]
+pub enum NoPilot {
+    /// Little is asked for.
+    #[error("the job is too small for trying others in 2 % of it")]
+    TooLittle,
+    /// There is much to read for what is asked for.
+    #[error("the scene is too large to be read once more for trying others")]
+    TooLarge,
+    /// Paths go on and on.
+    #[error("paths are too long here for trying to join them")]
+    TooLong,
+    /// The scene cannot be rendered.
+    #[error(transparent)]
+    Prepare(#[from] PrepareError),
+    /// A batch gave no sum.
+    #[error(transparent)]
+    Render(#[from] RenderError),
+}
+
+/// What was tried.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Pilot {
+    /// The method that needs the least work for an error: the first, where no other is clearly better.
+    pub method: Method,
+    /// The size of the frames that were tried.
+    pub size: Size,
+    /// Each method that was tried.
+    pub trials: Vec<Trial>,
+    /// Work of the pilot over that of the job, as far as that is known before.
+    pub share: f64,
+}
+
+/// A method that was tried.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Trial {
+    /// The method.
+    pub method: Method,
+    /// Samples a pixel.
+    pub samples: u32,
+    /// Rays traced.
+    pub rays: u64,
+    /// What it took, counted: by how long a ray and a sample take by each method, in microseconds of one thread of the machine that this was
+    /// measured on.
+    pub work: f64,
+    /// Relative error by the spread of the samples.
+    pub relative_error: f64,
+    /// Standard error of its square, by a jackknife over the sequences.
+    pub square_error: f64,
+    /// Relative error by light that another method has met and this one has not.
+    pub missed: f64,
+    /// Work for the same error, over that of the method that is taken.
+    pub time_ratio: f64,
+}
+
+impl Trial {
+    /// The work for an error is in proportion to it. Where a few samples make the error there are more of them to come, so that a
+    /// standard error is added.
+    fn cost(&self) -> f64 {
+        let square = self.relative_error * self.relative_error + self.square_error;
+        let cost = (square + self.missed * self.missed) * self.work;
+        if cost.is_finite() { cost } else { f64::MAX }
+    }
+}
+
+/// The trial to go by: the first, where no other is good enough.
+fn chosen(trials: &[Trial], chance: Chance) -> &Trial {
+    let gain = match chance {
+        Chance::Never => GAIN,
+        Chance::Sometimes => GAIN_BY_CHANCE,
+    };
+    let first = &trials[0];
+    let others = trials[1..].iter().filter(|trial| trial.cost() < gain * first.cost());
+    others.min_by(|a, b| a.cost().total_cmp(&b.cost())).unwrap_or(first)
+}
+
+/// How long a batch takes, in microseconds of one thread: what `cargo run --release -p ovtigre-tests --bin auto` measured.
+fn work(method: Method, rays: u64, samples: f64) -> f64 {
+    let [a_ray, a_sample] = match method {
+        Method::Light => [0.3, 1.2],
+        Method::Bidirectional => [0.5, 0.0],
+        Method::Path | Method::Photon | Method::Radiosity => [0.56, 0.0],
+    };
+    a_ray * rays as f64 + a_sample * samples
+}
+
+/// Renders the pilot of a job. `environment` holds the bytes of the image that the settings name, if they do. Runs on the current
+/// rayon pool; the same arguments give the same pilot on any number of threads.
+pub fn pilot(bytes: impl Into<Arc<[u8]>>, environment: Option<&[u8]>, plan: &Plan) -> Result<Pilot, NoPilot> {
+    plan.check()?;
+    let job = plan.job();
+    let (settings, region) = small(plan, plan.pixels().min(PIXELS_MAX));
+    let prepared = prepare(bytes, environment, &settings)?;
+    let mut trying = Trying { prepared: &prepared, region, plan, all: Vec::new() };
+    for method in &plan.methods {
+        let lanes = (0..REPLICATES).map(|r| Prefix::empty(region, r, settings.layers.len() + 1));
+        trying.all.push((Settings { method: *method, ..settings.clone() }, lanes.collect()));
+    }
+    trying.run(job)?;
+    Ok(trying.finish(settings.size, job))
+}
+
+/// The same picture in about so many pixels.
+fn small(plan: &Plan, pixels: f64) -> (Settings, Region) {
+    let (Size { width, height }, region) = (plan.settings.size, plan.region);
+    let scale = (pixels / region.pixels() as f64).sqrt().min(1.0);
+    let length = |n: u32| (f64::from(n) * scale).round().max(1.0) as u32;
+    let size = Size { width: length(width), height: length(height) };
+    let start = |n: u32, of: u32, within: u32| {
+        ((f64::from(n) / f64::from(of) * f64::from(within)) as u32).min(within - 1)
+    };
+    let (x, y) = (start(region.x, width, size.width), start(region.y, height, size.height));
+    let region = Region {
+        x,
+        y,
+        width: length(region.width).min(size.width - x),
+        height: length(region.height).min(size.height - y),
+    };
+    (Settings { size, replicates: REPLICATES, ..plan.settings.clone() }, region)
+}
+
+/// Methods on trial: settings and replicates of each.
+struct Trying<'a> {
+    prepared: &'a Prepared,
+    region: Region,
+    plan: &'a Plan,
+    all: Vec<(Settings, Vec<Prefix>)>,
+}
+
+impl Trying<'_> {
+    /// Goes on while another block of all takes no more than its share of a job of so many samples.
+    fn run(&mut self, job: f64) -> Result<(), NoPilot> {
+        let mut start = 0;
+        for index in 0..BLOCKS_MAX {
+            let block = Block { index, start, count: start.max(1) };
+            if index == 0 {
+                self.append(0, 1, block)?;
+                if self.rays(0) as f64 > PATH_RAYS_MAX * self.region.pixels() as f64 {
+                    return Err(NoPilot::TooLong);
+                }
+                self.append(0, REPLICATES, block)?;
+                (1..self.all.len()).try_for_each(|method| self.append(method, REPLICATES, block))?;
+            } else if 2.0 * self.spent() > WORK_MAX.min(SHARE * self.job_work(job)) {
+                break;
+            } else {
+                (0..self.all.len()).try_for_each(|method| self.append(method, REPLICATES, block))?;
+            }
+            start += block.count;
+        }
+        Ok(())
+    }
+
+    /// Appends a block to the first `lanes` replicates of a method that do not have it.
+    fn append(&mut self, method: usize, lanes: u32, block: Block) -> Result<(), RenderError> {
+        let (settings, replicates) = &mut self.all[method];
+        for prefix in replicates.iter_mut().take(lanes as usize) {
+            if prefix.blocks() == block.index {
+                let batch = Batch { region: self.region, replicate: prefix.replicate(), block };
+                let sum = render(self.prepared, settings, batch, &Progress::new())?;
+                prefix.append(&sum).expect("blocks come in order");
+            }
+        }
+        Ok(())
+    }
+
+    fn rays(&self, method: usize) -> u64 {
+        self.all[method].1.iter().map(Prefix::rays).sum()
+    }
+
+    /// Samples of one method, over all pixels and replicates.
+    fn samples(&self, method: usize) -> f64 {
+        self.all[method].1.iter().map(|p| f64::from(p.samples()) * self.region.pixels() as f64).sum()
+    }
+
+    fn work(&self, method: usize) -> f64 {
+        work(self.all[method].0.method, self.rays(method), self.samples(method))
+    }
+
+    fn spent(&self) -> f64 {
+        (0..self.all.len()).map(|method| self.work(method)).sum()
+    }
+
+    /// Work of a job of so many samples, or of as many as its error asks for, by the method that needs the least.
+    fn job_work(&self, job: f64) -> f64 {
+        let trials = self.trials();
+        let by = |(method, trial): (usize, &Trial)| {
+            let samples = match self.plan.error_target {
+                None => job,
+                Some(target) => {
+                    let a_pixel = f64::from(trial.samples) * (trial.relative_error / target).powi(2);
+                    job.min(a_pixel * self.plan.region.pixels() as f64)
+                }
+            };
+            self.work(method) / self.samples(method) * samples
+        };
+        trials.iter().enumerate().map(by).fold(f64::INFINITY, f64::min)
+    }
+
+    fn trials(&self) -> Vec<Trial> {
+        let trial = |(method, (settings, lanes)): (usize, &(Settings, Vec<Prefix>))| {
+            let others = self.all.iter().filter(|(other, _)| other.method != settings.method);
+            Trial {
+                method: settings.method,
+                samples: lanes.iter().map(Prefix::samples).sum(),
+                rays: self.rays(method),
+                work: self.work(method),
+                relative_error: square_of(self.region, lanes).sqrt(),
+                square_error: square_error(self.region, lanes),
+                missed: others.map(|(_, other)| missed(lanes, other)).fold(0.0, f64::max),
+                time_ratio: 1.0,
+            }
+        };
+        self.all.iter().enumerate().map(trial).collect()
+    }
+
+    fn finish(&self, size: Size, job: f64) -> Pilot {
+        let share = (self.spent() / self.job_work(job)).min(f64::MAX);
+        let trials = self.trials();
+        let (method, least) = {
+            let chosen = chosen(&trials, self.plan.chance);
+            (chosen.method, chosen.cost())
+        };
+        let mut pilot = Pilot { method, size, trials, share };
+        for trial in &mut pilot.trials {
+            trial.time_ratio = if least > 0.0 { (trial.cost() / least).min(f64::MAX) } else { 1.0 };
+        }
+        pilot
+    }
+}
+
+/// Square of the relative error of several replicates.
+fn square_of(region: Region, lanes: &[Prefix]) -> f64 {
+    let found = estimate(region, &[lanes.to_vec()], Look::at(1));
+    found.expect("each of several replicates has samples").relative.powi(2)
+}
+
+/// Its standard error: √((R − 1)/R · Σ (Cᵣ − C̄)²), Cᵣ the square without replicate r.
+fn square_error(region: Region, lanes: &[Prefix]) -> f64 {
+    let without: Vec<f64> =
+        (0..lanes.len()).map(|one| square_of(region, &[&lanes[..one], &lanes[one + 1..]].concat())).collect();
+    let r = without.len() as f64;
+    let mean = without.iter().sum::<f64>() / r;
+    ((r - 1.0) / r * without.iter().map(|c| (c - mean) * (c - mean)).sum::<f64>()).sqrt()
+}

@@ -1,0 +1,103 @@
+//! Which method is chosen where none is asked for.
+
+use ovtigre_core::{
+    render::pilot::{Chance, NoPilot, Pilot, Plan, pilot},
+    settings::Method,
+};
+use ovtigre_tests::{
+    picture::settings,
+    program::run,
+    scenes::cornell,
+    showcase::{caustic, lamp_behind_glass},
+};
+use serde_json::Value;
+use std::{fs, path::Path};
+
+fn plan(methods: &[Method], samples: u32) -> Plan {
+    plan_of([192, 108], methods, samples)
+}
+
+fn plan_of([width, height]: [u32; 2], methods: &[Method], samples: u32) -> Plan {
+    let settings = settings(width, height, 4);
+    let region = settings.size.frame();
+    let (methods, chance) = (methods.to_vec(), Chance::Sometimes);
+    Plan { settings, region, samples, error_target: None, seconds: None, triangles: 5000, chance, methods }
+}
+
+fn tried(glb: &[u8], plan: &Plan, threads: usize) -> Pilot {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    pool.install(|| pilot(glb, None, plan)).unwrap()
+}
+
+const ALL: [Method; 3] = [Method::Path, Method::Bidirectional, Method::Light];
+const TWO: [Method; 2] = [Method::Path, Method::Bidirectional];
+
+#[test]
+fn each_scene_gets_the_method_that_is_good_at_it() {
+    // The job of the table in docs/PERFORMANCE.md.
+    let job = |methods: &[Method]| plan_of([480, 270], methods, 256);
+    let diffuse = Plan { chance: Chance::Never, ..job(&ALL) };
+    let found = tried(&cornell(), &diffuse, 2);
+    assert_eq!(found.method, Method::Path, "{found:?}");
+    for glb in [caustic(), lamp_behind_glass()] {
+        let found = tried(&glb, &job(&TWO), 2);
+        assert_eq!(found.method, Method::Bidirectional, "{found:?}");
+        assert!(found.share <= 0.02, "{found:?}");
+    }
+}
+
+#[test]
+fn a_pilot_is_the_same_on_any_number_of_threads() {
+    let (glb, plan) = (caustic(), plan(&TWO, 32));
+    assert_eq!(tried(&glb, &plan, 1), tried(&glb, &plan, 3));
+}
+
+#[test]
+fn a_pilot_takes_little_of_what_is_asked_for() {
+    let (glb, more) = (cornell(), plan(&ALL, 4096));
+    let few = Plan { error_target: Some(0.5), ..more.clone() };
+    let [few, more] = [few, more].map(|plan| tried(&glb, &plan, 2));
+    assert!(few.trials[0].samples < more.trials[0].samples, "a rough picture needs few samples");
+    assert!(more.share < 0.02, "{more:?}");
+    for (change, why) in [
+        (Plan { samples: 4, ..plan(&ALL, 1) }, "too small"),
+        (Plan { seconds: Some(0.1), ..plan(&ALL, 4096) }, "too small"),
+        (Plan { triangles: 1 << 21, ..plan(&ALL, 1 << 20) }, "too large"),
+    ] {
+        let refused: NoPilot = pilot(&glb[..], None, &change).unwrap_err();
+        assert!(refused.to_string().contains(why), "{refused}");
+    }
+}
+
+/// The report of a render of 96×54 pixels.
+fn report(folder: &Path, name: &str, flags: &[&str]) -> Value {
+    let path = |end: &str| folder.join(format!("{name}.{end}")).to_str().unwrap().to_owned();
+    let scene = folder.join("scene.glb").to_str().unwrap().to_owned();
+    let (picture, report) = (path("exr"), path("json"));
+    let common =
+        ["--size", "96x54", "--samples", "64", "--workers", "1", "-o", &picture, "--report", &report];
+    let done = run([&["render", &scene], &common[..], flags].concat());
+    let said = String::from_utf8(done.stderr).unwrap();
+    assert!(done.status.success(), "{said}");
+    let report: Value = serde_json::from_slice(&fs::read(report).unwrap()).unwrap();
+    let line = format!("method: {}, ", report["job"]["method"].as_str().unwrap());
+    assert!(said.contains(&line), "{said}");
+    report
+}
+
+#[test]
+fn what_is_chosen_is_what_asking_for_it_gives() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("scene.glb"), caustic()).unwrap();
+    let chosen = report(folder.path(), "chosen", &[]);
+    let job = &chosen["job"];
+    assert_eq!(job["method"], "bidirectional", "{}", job["pilot"]);
+    assert_eq!(job["pilot"]["trials"].as_array().unwrap().len(), 2, "light leaves out paths here");
+    assert!(job["method_reason"].as_str().unwrap().contains("path"), "{}", job["method_reason"]);
+    let asked = report(folder.path(), "asked", &["--method", "bidirectional"]);
+    assert_eq!((&asked["job"]["method_reason"], &asked["job"]["pilot"]), (&"asked for".into(), &Value::Null));
+    let [a, b] = ["chosen.exr", "asked.exr"].map(|name| folder.path().join(name));
+    let compared =
+        run(["compare".as_ref(), a.as_os_str(), b.as_os_str(), "--tolerance".as_ref(), "0".as_ref()]);
+    assert!(compared.status.success(), "{}", String::from_utf8_lossy(&compared.stdout));
+}
