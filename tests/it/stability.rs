@@ -12,7 +12,26 @@ const SHARE: f64 = 0.001;
 
 /// What is known to fail: case, trial, and between what the result lies, relative to the known answer (of bounds: what was
 /// found). Mended, it fails here.
-const KNOWN: [(&str, &str, [f64; 2]); 0] = [];
+const KNOWN: [(&str, &str, [f64; 2]); 18] = [
+    ("a lamp in a white room of metal of roughness 0.8", "path", [-0.2964, -0.1976]),
+    ("10⁻⁵ m at the side of 10⁵ m", "*", [-1.0000, -0.9900]),
+    ("walls in the same planes", "path", [0.1777, 0.2665]),
+    ("walls in the same planes", "light", [0.7826, 1.1739]),
+    ("walls in the same planes", "bidirectional", [0.4045, 0.6067]),
+    ("a sheet 1e-7 m over a floor", "path", [0.5787, 0.8681]),
+    ("a sheet 1e-7 m over a floor", "light", [1.1619, 1.7429]),
+    ("a sheet 1e-7 m over a floor", "bidirectional", [0.6032, 0.9048]),
+    ("lamps of radiance 10⁻³⁰ and 10³⁰", "light, of 10⁻³⁰", [-1.0000, -0.9900]),
+    ("a ball of index 100", "path", [-0.0209, -0.0140]),
+    ("a ball of index 1.0001, roughness 0.5", "path", [-0.0420, -0.0280]),
+    ("a ball of index 1.05, roughness 0.5", "path", [-0.0581, -0.0387]),
+    ("a ball of index 1.5, roughness 0.2", "path", [-0.0067, -0.0045]),
+    ("a ball of index 1.5, roughness 0.5", "path", [-0.0208, -0.0139]),
+    ("a ball of index 2.4, roughness 0.5", "path", [-0.0457, -0.0304]),
+    ("a ball of index 100, roughness 0.5", "path", [-0.0925, -0.0617]),
+    ("100 solids of glass in each other", "path", [-1.0219, -0.6812]),
+    ("rough glass seen from both ends", "n = 2.4", [0.000_200, 0.000_201]),
+];
 
 fn known(case: &str, by: &str) -> Option<[f64; 2]> {
     KNOWN.iter().find(|(c, b, _)| *c == case && (*b == by || *b == "*")).map(|(_, _, range)| *range)
@@ -56,23 +75,24 @@ fn what_is_known_to_fail_is_a_case() {
 #[test]
 fn cheap_cases_find_a_bias_of_a_third_of_a_percent() {
     let cheap = [
-        ("walls of reflectance 0.9", "path"),
-        ("a lamp over a floor, × 1e-6, moved by 1e6", "path"),
-        ("a lamp that stands on the floor", "path"),
-        ("two lamps that meet in a corner of the floor", "path"),
-        ("a sun of 10⁻³ degrees", "path"),
-        ("a lamp of 10⁴ m", "path"),
-        ("a ball of index 2.4", "path"),
-        ("floor, light and camera in an absorber", "bidirectional"),
-        ("100 shells of glass in each other", "path"),
+        ("walls of reflectance 0.9", "path", 0.4),
+        ("a lamp over a floor, × 1e-6, moved by 1e6", "path", 0.02),
+        ("a lamp that stands on the floor", "path", 0.05),
+        ("two lamps that meet in a corner of the floor", "path", 0.02),
+        ("a sun of 10⁻³ degrees", "path", 0.02),
+        ("a lamp of 10⁻⁴ m by 1 m", "path", 0.02),
+        ("a small lamp in the middle of its scene", "path", 0.02),
+        ("a lamp of 10⁴ m", "path", 0.02),
+        ("a ball of index 2.4", "path", 0.02),
+        ("floor, light and camera in an absorber", "bidirectional", 0.02),
     ];
-    for (name, by) in cheap {
-        let cases = cases();
-        let case = cases.iter().find(|case| case.name == name).expect("a case");
-        let trial = case.trials.iter().find(|trial| trial.by == by).expect("a trial");
-        let finding = trial.look(Budget { share: 0.02 });
+    let cases = cases();
+    cheap.par_iter().for_each(|(name, by, share)| {
+        let case = cases.iter().find(|case| case.name == *name).expect("a case");
+        let trial = case.trials.iter().find(|trial| trial.by == *by).expect("a trial");
+        let finding = trial.look(Budget { share: *share });
         assert_eq!(finding.verdict(), Verdict::Holds, "{name}: {finding:?}");
-    }
+    });
 }
 
 /// The rule itself: what it must not let through.

@@ -19,7 +19,8 @@ pub struct Piece {
 
 /// All of them.
 pub fn scenes() -> Vec<Piece> {
-    [cornell(), materials(), moving(), hanging(), many(), numbers()].iter().map(|glb| piece(glb)).collect()
+    let built = [cornell(), materials(), moving(), hanging(), many(), numbers()];
+    built.iter().map(|glb| piece(glb)).chain([under_pictures()]).collect()
 }
 
 /// The two chunks of a binary glTF that [`crate::glb::glb`] wrote.
@@ -150,6 +151,22 @@ fn hanging() -> Vec<u8> {
     framed(glb)
 }
 
+/// Light of six pictures around a ball.
+fn under_pictures() -> Piece {
+    let mut glb = Glb::new();
+    glb.body(json!({}), sphere(Vec3::ZERO, 0.7, 6));
+    let faces = [[255, 0, 0, 255], [0, 255, 0, 51], [90; 4], [255; 4], [1, 2, 3, 4], [0; 4]];
+    let images = faces.map(|texel| glb.texture(&png(2, &[texel; 4]), json!({})));
+    let light = json!({"intensity": 2.0, "rotation": [0, 0.6, 0, 0.8], "specularImages": [images],
+        "specularImageSize": 2, "irradianceCoefficients": [[0, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0, 0],
+        [0, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0, 0]]});
+    glb.document().insert("extensions".to_owned(), json!({"EXT_lights_image_based": {"lights": [light]}}));
+    glb.perspective(Vec3::new(0.0, 0.5, 5.0), Vec3::ZERO, 40.0);
+    let mut piece = piece(&glb.finish());
+    piece.json["scenes"][0]["extensions"] = json!({"EXT_lights_image_based": {"light": 0}});
+    piece
+}
+
 /// Instances, in the file and by extension.
 fn many() -> Vec<u8> {
     let mut glb = Glb::new();
@@ -181,13 +198,15 @@ fn numbers() -> Vec<u8> {
             {"bufferView": places, "componentType": 5122, "count": 4, "type": "VEC3", "min": [-100, -100, 0], "max": [100, 100, 20],
              "sparse": {"count": 1, "indices": {"bufferView": sparse, "componentType": 5121},
                 "values": {"bufferView": values}}},
-            {"bufferView": indices, "componentType": 5121, "count": 4, "type": "SCALAR"}
+            {"bufferView": indices, "componentType": 5121, "count": 4, "type": "SCALAR"},
+            {"bufferView": indices, "componentType": 5121, "count": 3, "type": "SCALAR"}
         ]),
     );
-    let primitive = |mode: u64| json!({"attributes": {"POSITION": 0}, "indices": 1, "mode": mode});
+    let primitive =
+        |mode: u64, indices: u64| json!({"attributes": {"POSITION": 0}, "indices": indices, "mode": mode});
     glb.document().insert(
         "meshes".to_owned(),
-        json!([{"primitives": [primitive(5), primitive(6)]}, {"primitives": [primitive(4)]}]),
+        json!([{"primitives": [primitive(5, 1), primitive(6, 1)]}, {"primitives": [primitive(4, 2)]}]),
     );
     glb.document().insert("extensionsUsed".to_owned(), json!(["KHR_mesh_quantization"]));
     glb.document().insert("extensionsRequired".to_owned(), json!(["KHR_mesh_quantization"]));

@@ -54,7 +54,12 @@ impl Mutator {
         let mut random = Random::new(self.seed.wrapping_mul(0x2545_f491_4f6c_dd1d) ^ number);
         let mut piece = self.corpus[random.below(self.corpus.len())].clone();
         let other = &self.corpus[random.below(self.corpus.len())];
-        match random.below(8) {
+        match random.below(10) {
+            8 | 9 => {
+                for _ in 0..=random.below(3) {
+                    change_number(&mut piece.json, &mut random);
+                }
+            }
             0 => {
                 let mut bytes = glb(piece.json.to_string().as_bytes(), &piece.binary);
                 let rest = glb(other.json.to_string().as_bytes(), &other.binary);
@@ -143,6 +148,31 @@ fn change_value(document: &mut Value, other: &Value, random: &mut Random) {
     };
     let mut new = Some(new);
     replace(document, &mut random.below(place), &mut new);
+}
+
+/// One number of a document becomes another: a fraction, a multiple, the opposite, or nearly the same.
+fn change_number(document: &mut Value, random: &mut Random) {
+    let mut numbers = Vec::new();
+    let mut open = vec![document];
+    while let Some(value) = open.pop() {
+        match value {
+            Value::Array(list) => open.extend(list),
+            Value::Object(map) => open.extend(map.values_mut()),
+            Value::Number(_) => numbers.push(value),
+            _ => {}
+        }
+    }
+    let place = random.below(numbers.len().max(1));
+    let Some(number) = numbers.into_iter().nth(place) else { return };
+    let was = number.as_f64().unwrap_or_default();
+    *number = match random.below(6) {
+        0 => json!(was * 0.5),
+        1 => json!(was * 1e3),
+        2 => json!(-was),
+        3 => json!(was + 1e-7),
+        4 => json!(was + 1.0),
+        _ => odd_number(random),
+    };
 }
 
 /// Numbers at which readers of documents stumble.

@@ -167,6 +167,12 @@ impl<'a> At<'a> {
         Ok(list.iter().enumerate().map(element).collect())
     }
 
+    /// An element of this array.
+    pub(crate) fn element(&self, index: usize) -> Result<Self, LoadError> {
+        let value = self.value.get(index).ok_or_else(|| self.error(format!("has no element {index}")))?;
+        Ok(Self { file: self.file, value, pointer: format!("{}/{index}", self.pointer) })
+    }
+
     /// The elements of an array of objects; none where it is absent.
     pub(crate) fn items(&self, key: &str) -> Result<Vec<Self>, LoadError> {
         self.elements(key)?.into_iter().map(Self::into_object).collect()

@@ -32,6 +32,7 @@ fn support(name: &str) -> Option<Support> {
         | "KHR_mesh_quantization"
         | "KHR_meshopt_compression"
         | "KHR_texture_transform"
+        | "EXT_lights_image_based"
         | "EXT_mesh_gpu_instancing"
         | "EXT_meshopt_compression"
         | "EXT_texture_webp" => Some(Support::Full),

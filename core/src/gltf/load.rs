@@ -14,8 +14,8 @@ use crate::gltf::report::{Animated, Dropped, Report};
 use crate::gltf::shapes::{Materials, Shape};
 use crate::gltf::textures::TextureTable;
 use crate::gltf::{
-    cameras, draco, extensions, instancing, knots, lights, materials, nodes, pictures, shapes, survey,
-    variants,
+    cameras, draco, extensions, image_based, instancing, knots, lights, materials, nodes, pictures, shapes,
+    survey, variants,
 };
 use crate::scene::data::SceneData;
 use crate::scene::material::{Coverage, Material, MaterialId};
@@ -90,6 +90,7 @@ pub fn load_as(bundle: &Bundle, limits: &Limits, choice: &Choice<'_>) -> Result<
         textures,
         cameras: cameras::read(&document, &stage, &normalisation, &mut problems)?,
         punctual: lights::read(&document, &stage, &normalisation, &mut problems)?,
+        environment: image_based::read(bundle, source, &mut problems)?,
         bounds,
         normalisation,
         knots: stage.knots.clone(),

@@ -19,6 +19,7 @@ mod gather;
 mod geometry;
 mod glb;
 mod guard;
+mod image_based;
 mod instancing;
 mod knots;
 mod lights;

@@ -43,12 +43,32 @@ pub(crate) static ROOT: Schema = Schema {
         free("skins", List(&SKIN)),
         free("animations", List(&ANIMATION)),
     ],
-    extensions: &[("KHR_lights_punctual", &LIGHTS), ("KHR_materials_variants", &VARIANTS)],
+    extensions: &[
+        ("EXT_lights_image_based", &IMAGE_BASED_LIGHTS),
+        ("KHR_lights_punctual", &LIGHTS),
+        ("KHR_materials_variants", &VARIANTS),
+    ],
 };
 
 static ASSET: Schema = plain(&[needed("version", Text), free("minVersion", Text)]);
 
-static SCENE: Schema = plain(&[free("name", Text), free("nodes", Indices("/nodes"))]);
+static SCENE: Schema = Schema {
+    fields: &[free("name", Text), free("nodes", Indices("/nodes"))],
+    extensions: &[("EXT_lights_image_based", &IMAGE_BASED_LIGHT_OF_SCENE)],
+};
+
+static IMAGE_BASED_LIGHT_OF_SCENE: Schema = plain(&[needed("light", Whole(0))]);
+
+static IMAGE_BASED_LIGHTS: Schema = plain(&[needed("lights", List(&IMAGE_BASED_LIGHT))]);
+
+static IMAGE_BASED_LIGHT: Schema = plain(&[
+    free("name", Text),
+    free("intensity", Number(0.0, MOST)),
+    free("rotation", Numbers(&[4], -1.0, 1.0)),
+    needed("irradianceCoefficients", Any),
+    needed("specularImages", Any),
+    needed("specularImageSize", Whole(1)),
+]);
 
 static NODE: Schema = Schema {
     fields: &[

@@ -21,6 +21,8 @@ use std::sync::Arc;
 
 /// What a scene without light needs.
 pub const DEFAULT_SKY: &str = "default sky";
+/// What a scene with light from infinitely far of its own needs.
+pub const IMAGE_BASED: &str = "image-based light";
 
 /// What is in a scene.
 #[derive(Clone, Debug)]
@@ -79,7 +81,8 @@ fn brightest(data: &SceneData) -> f64 {
     if !data.is_lit() {
         return f64::from(Environment::default_sky().brightest());
     }
-    data.materials.iter().map(|m| f64::from(m.emission.factor.max_element())).fold(0.0, f64::max)
+    let sky = data.environment.as_ref().map_or(0.0, |sky| f64::from(sky.brightest()));
+    data.materials.iter().map(|m| f64::from(m.emission.factor.max_element())).fold(sky, f64::max)
 }
 
 /// The brightest that a sample can be which meets a light by chance only: as bright as the brightest light, where eye subpaths may
@@ -97,7 +100,7 @@ pub fn by_chance(method: Method, letters: Letters, brightest: f64) -> Option<f64
 impl Contents {
     /// What of it matters to techniques, seen by its first camera under its own light; `tags` are those of any light.
     pub fn surroundings(&self, tags: &[LightTag]) -> Surroundings {
-        let sky = self.needs.iter().any(|need| need == DEFAULT_SKY);
+        let sky = self.needs.iter().any(|need| need == DEFAULT_SKY || need == IMAGE_BASED);
         let kinds = [
             (LightKind::Surface, self.report.emissive_triangles > 0),
             (LightKind::Environment, sky),
@@ -149,7 +152,7 @@ fn letters(material: &Material) -> Letters {
 }
 
 /// Each feature that a scene may need, and whether this one does.
-fn features(report: &Report, data: &SceneData) -> [(&'static str, bool); 15] {
+fn features(report: &Report, data: &SceneData) -> [(&'static str, bool); 18] {
     let any = |of: fn(&Material) -> bool| data.materials.iter().any(of);
     [
         ("triangles", data.meshes.iter().any(|m| !m.triangles.is_empty())),
@@ -160,9 +163,12 @@ fn features(report: &Report, data: &SceneData) -> [(&'static str, bool); 15] {
         ("alpha", any(|m| m.coverage != Coverage::Opaque)),
         ("transmission", any(|m| m.transmission.factor > 0.0)),
         ("volumes", any(|m| m.volume.is_some())),
+        ("brushed surfaces", any(|m| m.layers.as_ref().is_some_and(|l| l.finish.brush.factor > 0.0))),
+        ("thin films", any(|m| m.layers.as_ref().is_some_and(|l| l.finish.film.factor > 0.0))),
         ("emissive surfaces", any(Material::emits)),
         ("unlit surfaces", any(|m| m.unlit.is_some())),
         ("punctual lights", !data.punctual.is_empty()),
+        (IMAGE_BASED, data.environment.is_some()),
         (DEFAULT_SKY, !data.is_lit()),
         ("animation", report.animated.nodes > 0),
         ("skins", report.animated.skins > 0),

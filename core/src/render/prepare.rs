@@ -79,7 +79,7 @@ pub fn prepare(
 }
 
 /// Reads a scene, builds its trees and gathers its lights. `environment` holds the bytes of the image that the
-/// settings name, if they do. A scene that nothing lights gets a default sky.
+/// settings name, if they do; the scene's own counts where they name none. A scene that nothing lights gets a default sky.
 pub fn open(
     bytes: impl Into<Arc<[u8]>>,
     environment: Option<&[u8]>,
@@ -88,7 +88,7 @@ pub fn open(
     let times = [settings.shutter.open, settings.shutter.close];
     let choice = Choice { times, variant: settings.variant.as_deref() };
     let loaded = load_as(&Bundle::open(bytes)?, &Limits::default(), &choice)?;
-    let data = loaded.scene;
+    let mut data = loaded.scene;
     let views = views(&data, settings)?;
     let given = match &settings.environment {
         None => None,
@@ -100,7 +100,9 @@ pub fn open(
             }
         }),
     };
-    let environment = given.or_else(|| (!data.is_lit()).then(Environment::default_sky));
+    let is_lit = data.is_lit();
+    let own = data.environment.take().map(Arc::unwrap_or_clone);
+    let environment = given.or(own).or_else(|| (!is_lit).then(Environment::default_sky));
     Ok(Scene::new(data, environment, views)?)
 }
 

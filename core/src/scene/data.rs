@@ -2,6 +2,7 @@
 
 use crate::scene::bounds::Bounds;
 use crate::scene::camera::Camera;
+use crate::scene::environment::Environment;
 use crate::scene::instance::{Instance, Placement};
 use crate::scene::knots::Knots;
 use crate::scene::material::Material;
@@ -9,6 +10,7 @@ use crate::scene::mesh::Mesh;
 use crate::scene::normalisation::Normalisation;
 use crate::scene::punctual::Punctual;
 use crate::scene::texture::Texture;
+use std::sync::Arc;
 
 /// Everything a file says about a scene, in the scene's space. Indices between the lists are in range.
 #[derive(Clone, Debug)]
@@ -25,6 +27,8 @@ pub struct SceneData {
     pub cameras: Vec<Camera>,
     /// Lights without extent.
     pub punctual: Vec<Punctual>,
+    /// Light from infinitely far that the file itself has.
+    pub environment: Option<Arc<Environment>>,
     /// A box around all geometry at all knots, in the scene's space.
     pub bounds: Bounds,
     /// From the file's space to the scene's.
@@ -43,6 +47,7 @@ impl SceneData {
             textures: Vec::new(),
             cameras: Vec::new(),
             punctual: Vec::new(),
+            environment: None,
             bounds: Bounds::EMPTY,
             normalisation: Normalisation::IDENTITY,
             knots: Knots::STILL,
@@ -83,7 +88,9 @@ impl SceneData {
     /// Whether it has light of its own. Textures that glow, and no more than white would, are taken for decoration: what has
     /// no other light was made to be seen under a sky.
     pub fn is_lit(&self) -> bool {
-        !self.punctual.is_empty() || self.materials.iter().any(|m| m.emits() && !m.only_glows())
+        !self.punctual.is_empty()
+            || self.environment.is_some()
+            || self.materials.iter().any(|m| m.emits() && !m.only_glows())
     }
 
     /// The material of a triangle of an instance.

@@ -60,6 +60,17 @@ impl Environment {
         Self::new(2, height, (0..height).flat_map(row).collect(), 0.0)
     }
 
+    /// An image of so many columns and rows of what `radiance` tells of unit directions.
+    pub fn of(width: usize, height: usize, radiance: impl Fn(Vec3) -> Rgb) -> Self {
+        let texel = |i: usize| {
+            let (x, y) = (i % width, i / width);
+            let (sin_latitude, cos_latitude) = libm::sincosf(PI * (y as f32 + 0.5) / height as f32);
+            let (sin, cos) = libm::sincosf(TAU * ((x as f32 + 0.5) / width as f32 - 0.5));
+            radiance(Vec3::new(sin_latitude * sin, cos_latitude, -sin_latitude * cos)).to_array()
+        };
+        Self::new(width, height, (0..width * height).map(texel).collect(), 0.0)
+    }
+
     /// The largest radiance that a channel of it has.
     pub fn brightest(&self) -> f32 {
         self.texels.as_flattened().iter().copied().fold(0.0, f32::max)

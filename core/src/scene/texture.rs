@@ -98,8 +98,9 @@ impl Picture {
         }
     }
 
+    /// A texel, decoded.
     #[inline]
-    fn texel(&self, encoding: Encoding, x: u32, y: u32) -> Vec4 {
+    pub(crate) fn texel(&self, encoding: Encoding, x: u32, y: u32) -> Vec4 {
         let index = y as usize * self.width as usize + x as usize;
         match (&self.texels, encoding) {
             (Texels::Bytes(texels), Encoding::Srgb) => {

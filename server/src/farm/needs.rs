@@ -1,8 +1,9 @@
 //! What a job needs of what the program can do, and what it leaves out, why.
 
-use super::reach::{DEFAULT_SKY, letters};
+use super::reach::{is_sky, letters};
 use ovtigre_core::{
     bsdf::event::{Letter, Letters},
+    render::inspect::DEFAULT_SKY,
     settings::{Method, Settings},
 };
 use ovtigre_proto::{
@@ -18,7 +19,7 @@ pub fn needs(scene: &SceneContents, settings: &Settings, words: Letters) -> Need
     let mut list = Needs::default();
     for what in &scene.needs {
         match &settings.environment {
-            Some(_) if what == DEFAULT_SKY => leave(&mut list, what, "an environment is given"),
+            Some(_) if is_sky(what) => leave(&mut list, what, "an environment is given"),
             _ => need(&mut list, what),
         }
     }

@@ -6,12 +6,15 @@ use ovtigre_core::{
         expression::language::Language,
         reach::{EyeKind, LightKind, Surroundings, Unreachable, unreachable},
     },
+    render::inspect::{DEFAULT_SKY, IMAGE_BASED},
     settings::{CameraChoice, Lens, Method},
 };
 use ovtigre_proto::{job::JobRequest, scene::SceneContents};
 
-/// What a scene without light needs, as its report names it.
-pub const DEFAULT_SKY: &str = ovtigre_core::render::inspect::DEFAULT_SKY;
+/// Whether what a scene needs is light from infinitely far.
+pub fn is_sky(need: &str) -> bool {
+    [DEFAULT_SKY, IMAGE_BASED].contains(&need)
+}
 
 /// Paths of `language` that `method` does not make of a scene as it is asked for.
 pub fn missing(
@@ -22,7 +25,7 @@ pub fn missing(
     camera: CameraChoice,
     lens: Option<Lens>,
 ) -> Vec<Unreachable> {
-    let sky = request.environment.is_some() || scene.needs.iter().any(|need| need == DEFAULT_SKY);
+    let sky = request.environment.is_some() || scene.needs.iter().any(|need| is_sky(need));
     let lights = scene.lights;
     let kinds = [
         (LightKind::Surface, lights.emissive_triangles > 0),

@@ -5,7 +5,7 @@ use super::{
     error::{FarmError, Result, fault},
     needs::needs,
     paths::choose,
-    reach::{DEFAULT_SKY, letters, line, missing},
+    reach::{letters, line, missing},
     rules::{PARTIAL_BYTES_MAX, Rules},
     spec::JobSpec,
 };
@@ -21,7 +21,7 @@ use ovtigre_core::{
     bsdf::event::Letters,
     film::size::{Region, Size},
     path::expression::language::Language,
-    render::inspect::by_chance,
+    render::inspect::{DEFAULT_SKY, by_chance},
     settings::{CameraChoice, Environment, EnvironmentSource, Lens, Settings, Shutter},
 };
 use ovtigre_proto::{

@@ -56,7 +56,7 @@ fn main() -> anyhow::Result<()> {
         } else if let Some(at) = &at {
             std::fs::remove_file(at)?;
         }
-        if number < 6 && outcome != Outcome::Rendered {
+        if number < 7 && outcome != Outcome::Rendered {
             eprintln!("file {number}, which is not changed: {outcome:?}");
         }
         let kind = match outcome {

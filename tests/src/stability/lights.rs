@@ -62,6 +62,14 @@ pub fn cases() -> Vec<Case> {
             [0.0; 2],
             &EYE,
         ),
+        over_floor(
+            "a lamp of 10⁻⁴ m by 1 m",
+            "slivers whose own distance is hard to tell, at the ends of shadow rays",
+            &[strip(0.4, 1.0, 0.1, [1e-4, 1.0])],
+            [0.0; 2],
+            &ALL,
+        ),
+        in_the_middle(),
         many(),
         apart(),
     ]
@@ -70,7 +78,11 @@ pub fn cases() -> Vec<Case> {
 type Lamp = [Vec3; 4];
 
 fn square(x: f32, y: f32, z: f32, side: f32) -> Lamp {
-    let corner = |dx: f32, dz: f32| Vec3::new(x + dx * side / 2.0, y, z + dz * side / 2.0);
+    strip(x, y, z, [side; 2])
+}
+
+fn strip(x: f32, y: f32, z: f32, [width, length]: [f32; 2]) -> Lamp {
+    let corner = |dx: f32, dz: f32| Vec3::new(x + dx * width / 2.0, y, z + dz * length / 2.0);
     [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)]
 }
 
@@ -130,6 +142,28 @@ fn over_floor(
         known: format!("Lambert's polygon formula in f64, mean over what is seen: {truth:.6e}"),
         note: "",
         trials: mean_is_by(methods, glb, &by(Method::Path, 4), truth),
+    }
+}
+
+/// A black ceiling as high above the lamp as the floor is below it.
+fn in_the_middle() -> Case {
+    let lamp = square(0.0, 1.0, 0.0, 0.02);
+    let truth = mean_radiance(&[(lamp, 3.0)], [[-0.25, 0.25]; 2], 192);
+    let glb = move || {
+        let mut glb = Glb::new();
+        glb.body(lambert(REFLECTANCE, 0.0), floor(0.0, 4.0, 0.0, 0.0));
+        glb.body(lambert(0.0, 0.0), floor(2.0, 4.0, 0.0, 0.0));
+        glb.body(lambert(0.0, 3.0), quad(lamp));
+        glb.orthographic(Vec3::new(0.0, 0.5, 0.0), Vec3::ZERO, 0.5, 0.5);
+        glb.finish()
+    };
+    Case {
+        group: GROUP,
+        name: "a small lamp in the middle of its scene".to_owned(),
+        stresses: "a surface at the origin is known far more exactly than rays from afar end",
+        known: format!("Lambert's polygon formula in f64, mean over what is seen: {truth:.6e}"),
+        note: "",
+        trials: mean_is_by(&ALL, glb, &by(Method::Path, 4), truth),
     }
 }
 

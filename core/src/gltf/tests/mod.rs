@@ -5,6 +5,7 @@ mod builder;
 mod bundles;
 mod compressed;
 mod geometry;
+mod image_based;
 mod motion;
 mod placement;
 mod refusals;
