@@ -119,7 +119,7 @@ async fn every_change_is_told_once_it_can_be_though_the_farm_was_killed() {
     let over = |came: &[Came]| came.last().unwrap().notice().data.state == JobState::Cancelled;
     service.until("the end is told", over).await;
 
-    let came = service.came.lock().unwrap();
+    let came = std::mem::take(&mut *service.came.lock().unwrap());
     let refused: Vec<&Came> = came.iter().filter(|one| !one.taken).collect();
     let taken: Vec<&Came> = came.iter().filter(|one| one.taken).collect();
     let states: Vec<JobState> = taken.iter().map(|one| one.notice().data.state).collect();
@@ -129,14 +129,13 @@ async fn every_change_is_told_once_it_can_be_though_the_farm_was_killed() {
         "the same notice again"
     );
     let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap().as_secs();
-    for one in came.iter() {
+    for one in &came {
         assert!(one.is_signed_with(&KEY));
         assert!(!one.is_signed_with(&[43; 32]));
         assert_eq!(one.notice().data.id, job.id);
         assert!(now.abs_diff(one.head("webhook-timestamp").parse().unwrap()) < 120);
     }
     assert_eq!(taken[2].notice().data.reason.as_deref(), Some("cancelled"));
-    drop(came);
     let client = Client::new(&farm.url, 1).unwrap();
     let shown = serde_json::to_string(&client.job(&job.id).await.unwrap()).unwrap();
     assert!(

@@ -81,17 +81,9 @@ impl Farm {
     ) -> Result<Commit> {
         self.need_room_for_sums()?;
         let (job, key) = batch_of(lease).ok_or_else(|| FarmError::not_found("lease", lease))?;
-        // Whether a job that is in memory is over, the store says when the sum is taken.
-        let live = match self.live(&job) {
-            Some(live) => live,
-            None => {
-                let row = self.store.job(&job).await?.ok_or_else(|| FarmError::not_found("lease", lease))?;
-                let Some(live) = self.meet(&job).await?.filter(|_| !row.state.is_over()) else {
-                    self.counters.count(Fate::NotNeeded);
-                    return Ok(Commit::NotNeeded);
-                };
-                live
-            }
+        let Some(live) = self.wanted(lease, &job).await? else {
+            self.counters.count(Fate::NotNeeded);
+            return Ok(Commit::NotNeeded);
         };
         let batch = live.batch(key).ok_or_else(|| FarmError::not_found("lease", lease))?;
         let Decoded { sum, hash, solution } = match self.decode(&live, batch, partial.clone()).await {
@@ -154,6 +146,15 @@ impl Farm {
                 Err(FarmError::not_found("lease", lease))
             }
         }
+    }
+
+    /// The job of a sum, unless it is over. Of one that is in memory the store says so when the sum is taken.
+    async fn wanted(self: &Arc<Self>, lease: &LeaseId, job: &JobId) -> Result<Option<Arc<Live>>> {
+        if let Some(live) = self.live(job) {
+            return Ok(Some(live));
+        }
+        let row = self.store.job(job).await?.ok_or_else(|| FarmError::not_found("lease", lease))?;
+        Ok(self.meet(job).await?.filter(|_| !row.state.is_over()))
     }
 
     /// A worker has brought what those in `failed` could not render: that was not the job's fault.

@@ -33,7 +33,7 @@ pub(super) fn batch(region: u32, replicate: u32, block: u32) -> BatchKey {
     BatchKey { block, replicate, region }
 }
 
-fn new_job(name: &str) -> NewJob {
+pub(super) fn new_job(name: &str) -> NewJob {
     NewJob {
         id: id(name),
         name: format!("job {name}"),
@@ -88,6 +88,7 @@ pub(crate) async fn run<F: Future<Output = Arc<dyn Store>>>(open: impl Fn() -> F
     odd_texts_are_no_error(&*open().await).await;
     changes::what_was_brought_is_taken_back(&*open().await).await;
     changes::a_job_is_extended(&*open().await).await;
+    changes::changes_of_a_job_are_told_of_in_order(&*open().await).await;
     changes::tokens_and_workers_put_aside_are_remembered(&*open().await).await;
     many_at_once_are_each_done_once(open().await).await;
 }

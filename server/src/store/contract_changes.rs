@@ -1,9 +1,10 @@
 //! What every store does with what is undone, extended and let in.
 
-use super::contract::{LONG, NOW, batch, claim, commit, hash, id, join, with_job};
+use super::contract::{LONG, NOW, batch, claim, commit, hash, id, join, new_job, with_job};
 use super::{
     Store,
-    row::{CommitOutcome, Extension, JobChange, Lane, Progress, Role, Settlement, TokenRow},
+    notice::Webhook,
+    row::{CommitOutcome, Extension, JobChange, Lane, NewJob, Progress, Role, Settlement, TokenRow},
 };
 use ovtigre_proto::status::{JobState, WorkerState};
 
@@ -34,6 +35,33 @@ pub(super) async fn what_was_brought_is_taken_back(store: &dyn Store) {
     assert_eq!(store.pin_job(&job, "y").await.unwrap().as_deref(), Some("x"));
     assert_eq!(store.job(&job).await.unwrap().unwrap().class.as_deref(), Some("x"));
     assert_eq!(store.pin_job(&id("none"), "y").await.unwrap(), None);
+}
+
+pub(super) async fn changes_of_a_job_are_told_of_in_order(store: &dyn Store) {
+    let webhook = Webhook { url: "there".to_owned(), secret: "s".to_owned() };
+    store.add_job(NewJob { webhook: Some(webhook.clone()), ..new_job("a") }, None).await.unwrap();
+    with_job(store, "b").await;
+    assert!(store.due_notices(9, LONG).await.unwrap().is_empty(), "who sent a job knows of it");
+    let both = vec![claim("a", "l1", batch(0, 0, 0)), claim("b", "l2", batch(0, 0, 0))];
+    store.claim(both, LONG).await.unwrap();
+    let job = id("a");
+    let version = store.job(&job).await.unwrap().unwrap().version;
+    let stop =
+        JobChange { state: Some(JobState::Cancelled), reason: Some("no".to_owned()), ..JobChange::default() };
+    assert!(store.change_job(&job, version, stop).await.unwrap());
+    let first = store.due_notices(9, NOW).await.unwrap();
+    assert_eq!((first.len(), first[0].state, first[0].tries), (1, JobState::Running, 1));
+    let again = store.due_notices(9, LONG).await.unwrap();
+    assert_eq!((again.len(), again[0].sequence, again[0].tries), (1, first[0].sequence, 2));
+    assert!(store.due_notices(9, LONG).await.unwrap().is_empty(), "who took it has it for a while");
+    store.put_off_notice(first[0].sequence, NOW).await.unwrap();
+    assert_eq!(store.due_notices(9, LONG).await.unwrap()[0].tries, 3);
+    store.end_notice(first[0].sequence).await.unwrap();
+    let next = store.due_notices(9, NOW).await.unwrap();
+    assert_eq!((next.len(), next[0].state, next[0].reason.as_deref()), (1, JobState::Cancelled, Some("no")));
+    assert_eq!((&next[0].job, next[0].name.as_str(), &next[0].webhook), (&job, "job a", &webhook));
+    store.remove_job(&job).await.unwrap();
+    assert!(store.due_notices(9, NOW).await.unwrap().is_empty(), "nobody is told of what is forgotten");
 }
 
 pub(super) async fn a_job_is_extended(store: &dyn Store) {
