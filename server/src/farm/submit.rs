@@ -185,6 +185,24 @@ fn shares(request: &JobRequest, samples: u32, replicates: u32, note: &mut impl F
     }
 }
 
+/// The size of the frame, and the region of it that is rendered.
+fn frame(
+    request: &JobRequest,
+    scene: &SceneContents,
+    camera: CameraChoice,
+    note: &mut impl FnMut(&str, String),
+) -> (Size, Region) {
+    let size = request.size.unwrap_or_else(|| default_size(scene, camera));
+    if size.width == 0 || size.height == 0 || size.width.max(size.height) > Size::SIDE_MAX {
+        note("/size", format!("each side is 1 to {} pixels", Size::SIDE_MAX));
+    }
+    let region = request.region.unwrap_or(size.frame());
+    if !region.is_in(size) {
+        note("/region", format!("the region {region} does not lie in the frame of {size}"));
+    }
+    (size, region)
+}
+
 /// A request with every default resolved, or all its faults. An open method is `path`.
 pub fn resolve(
     request: JobRequest,
@@ -202,14 +220,7 @@ pub fn resolve(
     if let Some(detail) = request.variant.as_ref().and_then(|wanted| no_variant(wanted, scene)) {
         note("/variant", detail);
     }
-    let size = request.size.unwrap_or_else(|| default_size(scene, camera));
-    if size.width == 0 || size.height == 0 || size.width.max(size.height) > Size::SIDE_MAX {
-        note("/size", format!("each side is 1 to {} pixels", Size::SIDE_MAX));
-    }
-    let region = request.region.unwrap_or(size.frame());
-    if !region.is_in(size) {
-        note("/region", format!("the region {region} does not lie in the frame of {size}"));
-    }
+    let (size, region) = frame(&request, scene, camera, &mut note);
     let samples = request.samples.unwrap_or(SAMPLES_DEFAULT);
     let replicates = request.replicates.unwrap_or(REPLICATES_DEFAULT.min(samples));
     shares(&request, samples, replicates, &mut note);
