@@ -107,7 +107,7 @@ pub enum NoPilot {
     #[error("the job is too small for trying others in 2 % of it")]
     TooLittle,
     /// There is much to read for what is asked for.
-    #[error("the scene is too large to be read once more for trying others")]
+    #[error("reading the scene once more for trying others would take too much of the job")]
     TooLarge,
     /// Paths go on and on.
     #[error("paths are too long here for trying to join them")]
