@@ -24,23 +24,29 @@ fn written(argument: &Arg) -> String {
     }
 }
 
+/// What help says, apart from the default that it may name itself.
+fn explained(argument: &Arg) -> (String, String) {
+    let help = cell(&argument.get_help().map(ToString::to_string).unwrap_or_default());
+    let Some((before, rest)) = help.split_once(" [default: ") else { return (help, String::new()) };
+    let (default, after) = rest.split_once(']').unwrap_or((rest, ""));
+    (format!("{before}{after}"), default.to_owned())
+}
+
 fn row(argument: &Arg) -> String {
-    let help = argument.get_help().map(ToString::to_string).unwrap_or_default();
-    let choices: Vec<String> =
-        argument.get_possible_values().iter().map(|choice| format!("`{}`", choice.get_name())).collect();
-    let choices = if choices.is_empty() || !argument.get_action().takes_values() {
-        String::new()
-    } else {
-        format!(" One of {}.", choices.join(", "))
-    };
-    let defaults: Vec<_> =
-        argument.get_default_values().iter().map(|value| value.to_string_lossy()).collect();
-    let default = if defaults.is_empty() || !argument.get_action().takes_values() {
-        String::new()
-    } else {
-        format!("`{}`", defaults.join(" "))
-    };
-    format!("| {} | {} | {}{choices} |\n", written(argument), cell(&default), cell(&help))
+    let (mut means, mut default) = explained(argument);
+    if argument.get_action().takes_values() {
+        let given: Vec<_> =
+            argument.get_default_values().iter().map(|value| value.to_string_lossy()).collect();
+        if !given.is_empty() {
+            default = format!("`{}`", cell(&given.join(" ")));
+        }
+        let choices: Vec<String> =
+            argument.get_possible_values().iter().map(|choice| format!("`{}`", choice.get_name())).collect();
+        if !choices.is_empty() {
+            write!(means, ": {}", choices.join(", ")).expect("a string takes all");
+        }
+    }
+    format!("| {} | {means} | {default} |\n", written(argument).replace('|', "\\|"))
 }
 
 fn section(command: &Command, name: &str) -> String {
@@ -54,7 +60,7 @@ fn section(command: &Command, name: &str) -> String {
         })
         .collect();
     if !shown.is_empty() {
-        text.push_str("\n| flag | default | means |\n| --- | --- | --- |\n");
+        text.push_str("\n| flag | means | default |\n| --- | --- | --- |\n");
         shown.iter().for_each(|argument| text.push_str(&row(argument)));
     }
     for inner in command.get_subcommands().filter(|inner| inner.get_name() != "help") {
