@@ -124,6 +124,10 @@ fn a_job_is_watched_and_changed(browser: &Browser, farm: &Farm, job: &str) {
     browser.run(point, &[]);
     browser.until("document.querySelector('.read-out').textContent.includes('±')");
     assert!(text_of(browser, ".read-out").contains("pixel 48, 27"));
+    // What is said of a pixel goes on with the picture, wherever the pointer is.
+    browser.run("document.querySelector('.stage').dispatchEvent(new PointerEvent('pointerleave'));", &[]);
+    let said = json!(text_of(browser, ".read-out"));
+    browser.until(&format!("document.querySelector('.read-out').textContent !== {said}"));
     seen(browser, "job-running");
     browser.press("Pause");
     browser.until("document.querySelector('.badge').textContent === 'paused'");

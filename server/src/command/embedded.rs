@@ -55,8 +55,7 @@ impl Embedded {
         let cache = data.join("worker-scenes");
         let listen = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
         let rules = Rules { kept_sums_bytes, ..Rules::default() };
-        let traces =
-            Traces::from_environment("ovtigre-server").map_err(|e| CommandError::wrong(e.to_string()))?;
+        let traces = Traces::from_environment("ovtigre-server")?;
         let config = ServeConfig { rules, traces, ..ServeConfig::new(listen, data) };
         let serving = start(config).await.map_err(|e| CommandError::wrong(e.to_string()))?;
         let threads = plan.threads.map_or_else(|| share_of_cores(plan.workers), NonZeroUsize::get);

@@ -61,7 +61,7 @@ fn section(command: &Command, name: &str) -> String {
         .collect();
     if !shown.is_empty() {
         text.push_str("\n| flag | means | default |\n| --- | --- | --- |\n");
-        shown.iter().for_each(|argument| text.push_str(&row(argument)));
+        text.extend(shown.into_iter().map(row));
     }
     for inner in command.get_subcommands().filter(|inner| inner.get_name() != "help") {
         write!(text, "{}", section(inner, &format!("{name} {}", inner.get_name())))

@@ -96,8 +96,7 @@ impl Serve {
     /// Serves until it is interrupted.
     pub(crate) async fn run(self) -> Outcome {
         self.log.start();
-        let traces =
-            Traces::from_environment("ovtigre-server").map_err(|e| CommandError::wrong(e.to_string()))?;
+        let traces = Traces::from_environment("ovtigre-server")?;
         let interrupt = Interrupt::listen();
         let cache = self.data.join("worker-scenes");
         // A password in the environment is not in the list of processes.

@@ -23,8 +23,7 @@ impl Work {
     /// Works.
     pub(crate) async fn run(self) -> Outcome {
         self.log.start();
-        let traces =
-            Traces::from_environment("ovtigre-worker").map_err(|e| CommandError::wrong(e.to_string()))?;
+        let traces = Traces::from_environment("ovtigre-worker")?;
         let bell = Bell::default();
         tokio::spawn(bell.clone().ring_on_signals(self.work.first_signal()));
         if self.work.until_stdin_closes {
