@@ -234,6 +234,13 @@ fn workers_are_listed_and_drained(browser: &Browser) {
     browser.until("document.querySelector('table').textContent.includes('local-1')");
     browser.until("!document.querySelector('.numbers dd').textContent.includes('–')");
     seen(browser, "workers");
+    browser.run("document.querySelector('tbody button').kept = true; document.querySelector('tbody td:last-of-type').previousSibling.textContent = 'long ago'", &[]);
+    browser.until("!document.querySelector('tbody').textContent.includes('long ago')");
+    assert_eq!(
+        browser.value("document.querySelector('tbody button').kept"),
+        json!(true),
+        "a button is pressed in its first life"
+    );
     browser.press("Drain");
     browser.until("document.querySelector('dialog').open");
     browser.run("[...document.querySelectorAll('dialog button')].at(-1).click()", &[]);
