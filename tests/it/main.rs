@@ -25,6 +25,7 @@ mod same_bits;
 mod slope;
 mod stability;
 mod techniques;
+mod telemetry;
 mod tidy;
 mod tls;
 mod tokens;

@@ -3,6 +3,7 @@
 pub mod browser;
 pub mod calibration;
 pub mod clock;
+pub mod collector;
 pub mod corpus;
 pub mod glb;
 pub mod hostile;

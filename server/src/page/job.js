@@ -255,7 +255,7 @@ class JobView {
     fill(this.plot, plot(curve, this.axis, Math.max(280, this.plot.clientWidth)));
     fill(this.curveTable, table(curve));
     const facts = [
-      curve.slope === null ? null : `slope ${curve.slope.toFixed(2)} (−0.50 is plain Monte Carlo)`,
+      curve.slope === null ? null : `slope ${curve.slope.toFixed(2).replace('-', '−')} (−0.50 is plain Monte Carlo)`,
       curve.efficiency === null ? null : `efficiency ${digits(curve.efficiency)} 1/s`,
       curve.target_expected_at_seconds !== null && !curve.certified ? `target expected at ${seconds(curve.target_expected_at_seconds)} of run time` : null,
       curve.certified ? 'target reached and certified' : null,
