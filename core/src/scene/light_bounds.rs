@@ -55,7 +55,7 @@ impl Cone {
         let reach = wide.reach.max(slim.reach);
         let apart = libm::acos(wide.axis.dot(slim.axis).clamp(-1.0, 1.0));
         if (apart + slim.spread).min(PI) <= wide.spread {
-            return Self { sides, reach, ..wide };
+            return Self { reach, sides, ..wide };
         }
         // A little more than half of all, so that rounding leaves both inside.
         let spread = 0.5 * (wide.spread + apart + slim.spread) + 1e-9;
