@@ -22,7 +22,7 @@ fn crowded(unused_rings: u32) -> Vec<u8> {
     let mut glb = Glb::new();
     let unused = glb.material(lambert(0.3, 0.0));
     let (positions, triangles) = sphere(Vec3::ZERO, 1.0, unused_rings);
-    let elsewhere = glb.mesh(&positions, &triangles, unused);
+    glb.mesh(&positions, &triangles, unused);
     glb.texture(&png(16, &[[9; 4]; 256]), json!({}));
     let texels: Vec<[u8; 4]> = (0..64).map(|i| [40 + 3 * i, 250 - 2 * i, 90, 255]).collect();
     let shown = glb.texture(&png(8, &texels), json!({}));
@@ -46,7 +46,6 @@ fn crowded(unused_rings: u32) -> Vec<u8> {
     glb.animate(ball, "weights", "LINEAR", &[0.0, 1.0], &[0.0, 1.0]);
     glb.animate(ball, "translation", "LINEAR", &[0.0, 1.0], &[0.1, 0.0, 0.0, 0.4, 0.123_456_79, 0.0]);
     glb.perspective(Vec3::new(0.3, 2.0, 4.0), Vec3::new(0.0, 0.4, 0.0), 45.0);
-    let _ = elsewhere;
     glb.finish()
 }
 
