@@ -29,7 +29,7 @@ pub enum Hall {
 pub fn lamps(n: u32, hall: Hall) -> Vec<u8> {
     let mut glb = Glb::new();
     add(&mut glb, "floor", lambert(0.6, 0.0), floor(0.0, SIDE, 0.0, 0.0));
-    let across = (1..).find(|across| across * across >= n).unwrap_or(1);
+    let across = (1..=n).find(|across| across * across >= n).unwrap_or(1);
     let width = if hall == Hall::OneLamp { 1.0 } else { SIDE };
     let apart = width / across as f32;
     let height = if hall == Hall::OneLamp { 5.0 } else { (0.5 * apart).min(1.0) };

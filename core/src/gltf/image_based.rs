@@ -15,14 +15,21 @@ const NAME: &str = "EXT_lights_image_based";
 /// Most pixels along the edge of a face: an environment of four by two faces is made of them.
 const SIDE_MAX: u32 = 2048;
 
+/// What was read.
+pub(crate) struct ImageBased {
+    /// The light.
+    pub environment: Arc<Environment>,
+    /// Indices of the pictures that it was read from.
+    pub pictures: Vec<usize>,
+}
+
 /// The light that the scene names. Its sharpest pictures are the light itself; those made for rough surfaces, and
-/// the coefficients of irradiance, are what a render finds by itself. Pictures are `RGBD`: sRGB over alpha. With it come the
-/// indices of the pictures that were read.
+/// the coefficients of irradiance, are what a render finds by itself. Pictures are `RGBD`: sRGB over alpha.
 pub(crate) fn read(
     bundle: &Bundle,
     source: Source<'_>,
     problems: &mut Problems,
-) -> Result<Option<(Arc<Environment>, Vec<usize>)>, LoadError> {
+) -> Result<Option<ImageBased>, LoadError> {
     let Some(light) = named(source.document)? else { return Ok(None) };
     let mut faces = Vec::new();
     let images = source.document.count("images");
@@ -52,7 +59,7 @@ pub(crate) fn read(
     let cube = Cube::new(&faces);
     let radiance = |direction: Vec3| cube.radiance(turn * direction) * intensity;
     let environment = Environment::of(4 * side as usize, 2 * side as usize, radiance);
-    Ok(Some((Arc::new(environment), indices)))
+    Ok(Some(ImageBased { environment: Arc::new(environment), pictures: indices }))
 }
 
 /// The light of the scene that is shown.

@@ -97,7 +97,9 @@ pub(crate) fn load_and_note(
     let animated = count_animated(&animation, &tree, &shapes);
     let (meshes, instances) = count_uses(&shapes);
     let pictures = pictures::read(bundle, source, &table.images(), &mut problems)?;
-    let (environment, faces) = image_based::read(bundle, source, &mut problems)?.unzip();
+    let (environment, faces) = (image_based::read(bundle, source, &mut problems)?)
+        .map(|light| (light.environment, light.pictures))
+        .unzip();
     let images = table.images().into_iter().chain(faces.into_iter().flatten()).collect();
     let used = Used { views: source.buffers.seen(), images, compressed: source.buffers.are_compressed() };
     survey::survey(bundle, source, &table.images(), &mut problems);

@@ -97,7 +97,7 @@ fn images(
 /// A JSON object with other values of some members, all else left as it is written: numbers that are parsed and written again may
 /// differ in their last bit. `None` where a member stands there twice.
 fn spliced(text: &[u8], values: &[(&str, Value)]) -> Option<Vec<u8>> {
-    let (members, end) = members(text)?;
+    let Members { list: members, end } = members(text)?;
     let mut changed = Vec::with_capacity(text.len());
     let mut at = 0;
     for (name, span) in &members {
@@ -124,15 +124,22 @@ fn spliced(text: &[u8], values: &[(&str, Value)]) -> Option<Vec<u8>> {
     Some(changed)
 }
 
-/// Members of a JSON object, with the places of their values, and the place of its closing brace.
-fn members(text: &[u8]) -> Option<(Vec<(String, Range<usize>)>, usize)> {
+/// Members of a JSON object.
+struct Members {
+    /// Names, with the places of their values.
+    list: Vec<(String, Range<usize>)>,
+    /// The place of the closing brace.
+    end: usize,
+}
+
+fn members(text: &[u8]) -> Option<Members> {
     let blank = |at: usize| at + text[at..].iter().take_while(|byte| byte.is_ascii_whitespace()).count();
     let mut at = text.iter().position(|byte| *byte == b'{')? + 1;
-    let mut members = Vec::new();
+    let mut list = Vec::new();
     loop {
         at = blank(at);
         match text.get(at)? {
-            b'}' => return Some((members, at)),
+            b'}' => return Some(Members { list, end: at }),
             b',' => at = blank(at + 1),
             _ => {}
         }
@@ -146,7 +153,7 @@ fn members(text: &[u8]) -> Option<(Vec<(String, Range<usize>)>, usize)> {
         let mut values = serde_json::Deserializer::from_slice(&text[start..]).into_iter::<IgnoredAny>();
         values.next()?.ok()?;
         at = start + values.byte_offset();
-        members.push((name, start..at));
+        list.push((name, start..at));
     }
 }
 

@@ -115,7 +115,9 @@ pub fn is_worth_a_tree(data: &SceneData) -> bool {
             if emits[material.index()] {
                 count += 1;
                 let corners = data.corners(i as u32, t as u32, data.knots.moment(0.0));
-                corners.into_iter().for_each(|corner| bounds.include(corner.as_dvec3()));
+                for corner in corners {
+                    bounds.include(corner.as_dvec3());
+                }
             }
         }
     }
