@@ -15,7 +15,7 @@ const SHARE: f64 = 0.001;
 const KNOWN: [(&str, &str, [f64; 2]); 18] = [
     ("a lamp in a white room of metal of roughness 0.8", "path", [-0.2964, -0.1976]),
     ("10⁻⁵ m at the side of 10⁵ m", "*", [-1.0000, -0.9900]),
-    ("walls in the same planes", "path", [0.1777, 0.2665]),
+    ("walls in the same planes", "path", [0.1167, 0.1750]),
     ("walls in the same planes", "light", [0.7826, 1.1739]),
     ("walls in the same planes", "bidirectional", [0.4045, 0.6067]),
     ("a sheet 1e-7 m over a floor", "path", [0.5787, 0.8681]),
