@@ -84,6 +84,17 @@ id!(
     LeaseId, "a lease's id", "^[A-Za-z0-9_-]{1,64}$", is_short
 );
 
+impl LeaseId {
+    /// The job, and the numbers of region, replicate and block, that a farm's lease was handed out for: they are in its
+    /// name, `JOB_REGION_REPLICATE_BLOCK_NONCE`.
+    pub fn batch(&self) -> Option<(JobId, [u32; 3])> {
+        let mut parts = self.0.rsplitn(5, '_').skip(1);
+        let mut number = || parts.next()?.parse().ok();
+        let (block, replicate, region) = (number()?, number()?, number()?);
+        Some((parts.next()?.parse().ok()?, [region, replicate, block]))
+    }
+}
+
 impl BlobId {
     /// The name of `bytes`.
     pub fn of(hash: [u8; 32]) -> Self {

@@ -12,4 +12,5 @@ pub mod problem;
 pub mod route;
 pub mod scene;
 pub mod status;
+pub mod telemetry;
 pub mod webhook;

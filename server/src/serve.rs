@@ -15,6 +15,7 @@ use crate::{
 };
 use axum::{Router, serve::Listener};
 use ovtigre_core::gltf::limits::Limits;
+use ovtigre_proto::telemetry::traces::Traces;
 use std::{
     fs::{File, TryLockError},
     io,
@@ -48,6 +49,8 @@ pub struct ServeConfig {
     pub tls: Option<(PathBuf, PathBuf)>,
     /// Whether it listens on a port of this machine, too, for workers of its own: without encryption.
     pub own_port: OwnPort,
+    /// Where spans go.
+    pub traces: Traces,
 }
 
 /// Whether a farm listens on a free port of this machine, too.
@@ -72,6 +75,7 @@ impl ServeConfig {
             guarding: Guarding::default(),
             tls: None,
             own_port: OwnPort::No,
+            traces: Traces::default(),
         }
     }
 }
@@ -161,7 +165,7 @@ pub async fn start(config: ServeConfig) -> Result<Serving, ServeError> {
     let listener = TcpListener::bind(config.listen).await.map_err(listening)?;
     let address = listener.local_addr().map_err(listening)?;
     let (store, blobs) = open(&config).await?;
-    let farm = Farm::open(store, blobs, inspect(Limits::default()), config.rules).await?;
+    let farm = Farm::open(store, blobs, inspect(Limits::default()), config.rules, config.traces).await?;
     let closing = CancellationToken::new();
     let doors = router(Arc::clone(&farm), config.guarding);
     let (mut own, mut own_server) = (None, None);
@@ -225,6 +229,7 @@ impl Serving {
             }
         }
         self.farm.close().await;
+        self.farm.traces.stop().await;
     }
 }
 

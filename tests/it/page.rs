@@ -73,7 +73,7 @@ fn a_scene_becomes_a_picture_with_the_page_alone() {
     browser.press("New job");
     let job = a_job_is_made(&browser);
     a_job_is_watched_and_changed(&browser, &farm, &job);
-    pictures_are_compared(&browser);
+    pictures_are_compared(&browser, &farm);
     jobs_are_listed_and_cancelled(&browser, &farm, &job);
     workers_are_listed_and_drained(&browser);
     browser.press("Interface");
@@ -124,6 +124,10 @@ fn a_job_is_watched_and_changed(browser: &Browser, farm: &Farm, job: &str) {
     browser.run(point, &[]);
     browser.until("document.querySelector('.read-out').textContent.includes('±')");
     assert!(text_of(browser, ".read-out").contains("pixel 48, 27"));
+    // What is said of a pixel goes on with the picture, wherever the pointer is.
+    browser.run("document.querySelector('.stage').dispatchEvent(new PointerEvent('pointerleave'));", &[]);
+    let said = json!(text_of(browser, ".read-out"));
+    browser.until(&format!("document.querySelector('.read-out').textContent !== {said}"));
     seen(browser, "job-running");
     browser.press("Pause");
     browser.until("document.querySelector('.badge').textContent === 'paused'");
@@ -156,7 +160,16 @@ fn a_job_is_watched_and_changed(browser: &Browser, farm: &Farm, job: &str) {
     }
 }
 
-fn pictures_are_compared(browser: &Browser) {
+fn pictures_are_compared(browser: &Browser, farm: &Farm) {
+    // Of another size, so that it can be told from what is there.
+    let reference = farm.client(&["submit", ROOM, "--size", "48x27", "--samples", "16"]);
+    let reference = reference.trim();
+    farm.wait(reference, |job| job["state"] == "done");
+    browser.rewrite(".controls label:nth-of-type(3) select", "job:");
+    browser.rewrite("#asked", reference);
+    browser.press("Compare");
+    browser.until("document.querySelector('canvas.side.b').width === 48");
+    browser.screenshot("job-wipe-reference");
     // The viewer's own drop-downs: what is shown, and what it is compared with.
     browser.rewrite(".controls label:nth-of-type(3) select", "layer:error");
     browser.until("!document.querySelector('.legend').hidden");
@@ -187,7 +200,7 @@ fn jobs_are_listed_and_cancelled(browser: &Browser, farm: &Farm, job: &str) {
         assert_eq!(browser.run(submit, &[json!(name), farm.job(job)["scene"].take()]), 202);
     }
     browser.click("nav a[data-view=jobs]");
-    browser.until("document.querySelectorAll('.jobs-table tbody tr').length === 3");
+    browser.until("document.querySelectorAll('.jobs-table tbody tr').length === 4");
     assert_eq!(browser.value("document.querySelectorAll('.jobs-table img').length"), 0);
     browser.until("document.querySelectorAll('.thumb canvas').length >= 1");
     seen(browser, "jobs");
@@ -196,7 +209,7 @@ fn jobs_are_listed_and_cancelled(browser: &Browser, farm: &Farm, job: &str) {
     browser.write("input[type=search]", "ALP");
     browser.until("document.querySelectorAll('.jobs-table tbody tr').length === 1");
     browser.rewrite("input[type=search]", "");
-    browser.until("document.querySelectorAll('.jobs-table tbody tr').length === 3");
+    browser.until("document.querySelectorAll('.jobs-table tbody tr').length === 4");
     for name in ["alpha", "beta"] {
         browser.click(&format!("input[aria-label='Choose {name}']"));
     }
@@ -221,6 +234,13 @@ fn workers_are_listed_and_drained(browser: &Browser) {
     browser.until("document.querySelector('table').textContent.includes('local-1')");
     browser.until("!document.querySelector('.numbers dd').textContent.includes('–')");
     seen(browser, "workers");
+    browser.run("document.querySelector('tbody button').kept = true; document.querySelector('tbody td:last-of-type').previousSibling.textContent = 'long ago'", &[]);
+    browser.until("!document.querySelector('tbody').textContent.includes('long ago')");
+    assert_eq!(
+        browser.value("document.querySelector('tbody button').kept"),
+        json!(true),
+        "a button is pressed in its first life"
+    );
     browser.press("Drain");
     browser.until("document.querySelector('dialog').open");
     browser.run("[...document.querySelectorAll('dialog button')].at(-1).click()", &[]);

@@ -3,11 +3,13 @@
 pub mod browser;
 pub mod calibration;
 pub mod clock;
+pub mod collector;
 pub mod corpus;
 pub mod glb;
 pub mod hostile;
 pub mod irradiance;
 pub mod job_promises;
+pub mod lamps;
 pub mod matrix;
 pub mod mutate;
 pub mod mutation;

@@ -86,6 +86,24 @@ impl Farm {
         Self::start_as(command(), data, further)
     }
 
+    /// Starts a farm with further variables.
+    pub fn start_among(environment: &[(&str, &str)], data: &Path, further: &[&str]) -> Self {
+        let mut serve = command();
+        serve.envs(environment.iter().copied());
+        Self::start_as(serve, data, further)
+    }
+
+    /// Starts a farm that logs to a file.
+    pub fn start_logged(log: &Path, data: &Path, further: &[&str]) -> Self {
+        let log = std::fs::File::create(log).expect("a file can be written here");
+        Self::start_to(log.into(), command(), data, further)
+    }
+
+    /// The number of its process.
+    pub fn process_id(&self) -> u32 {
+        self.process.0.id()
+    }
+
     /// Starts a farm in a folder that is a small disk of its own, of so many MiB; `None` where that is not allowed. The disk
     /// goes away with the process.
     pub fn start_on_a_disk(data: &Path, mib: u32, further: &[&str]) -> Option<Self> {
@@ -105,9 +123,13 @@ impl Farm {
         PathBuf::from(format!("/proc/{}/root", self.process.0.id()))
     }
 
-    fn start_as(mut serve: Command, data: &Path, further: &[&str]) -> Self {
+    fn start_as(serve: Command, data: &Path, further: &[&str]) -> Self {
+        Self::start_to(Stdio::null(), serve, data, further)
+    }
+
+    fn start_to(log: Stdio, mut serve: Command, data: &Path, further: &[&str]) -> Self {
         serve.args(["serve", "--listen", "127.0.0.1:0", "--data"]).arg(data).args(further);
-        serve.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::null());
+        serve.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(log);
         let mut child = serve.spawn().expect("the program starts");
         let mut line = String::new();
         let stdout = child.stdout.take().expect("piped");

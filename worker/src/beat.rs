@@ -2,6 +2,7 @@
 
 use crate::{
     desk::{Desk, duration},
+    errand::note,
     leave::{Bell, Leave},
     run::WorkerError,
     scenes::SceneFolder,
@@ -65,7 +66,7 @@ impl Beat<'_> {
                         std::future::pending::<()>().await;
                     }
                     tracing::warn!("the farm does not know this worker any more: joining again");
-                    self.desk.take_all();
+                    drop(self.desk.take_all());
                     self.id.send_replace(None);
                     Duration::ZERO
                 }
@@ -103,19 +104,18 @@ impl Beat<'_> {
         };
         let asked = Instant::now();
         let reply = self.client.exchange(&id, &exchange).await?;
-        Ok(self.hear(&exchange, asked, reply))
+        Ok(self.hear(&id, &exchange, asked, reply))
     }
 
-    fn hear(&self, said: &Exchange, asked: Instant, reply: ExchangeReply) -> Duration {
+    fn hear(&self, id: &WorkerId, said: &Exchange, asked: Instant, reply: ExchangeReply) -> Duration {
         self.desk.renewed(&said.holding, asked);
-        if !reply.drop.is_empty() {
-            tracing::debug!(leases = reply.drop.len(), "dropped");
-            self.desk.drop_leases(&reply.drop);
+        for errand in self.desk.drop_leases(&reply.drop) {
+            note!(debug, errand, "not wanted any more: dropped");
         }
         self.drop_ended();
         if !reply.leases.is_empty() {
-            tracing::debug!(leases = reply.leases.len(), "took");
-            self.desk.add(reply.leases, asked);
+            tracing::debug!(worker = %id, leases = reply.leases.len(), "took");
+            self.desk.add(reply.leases, id, asked);
         }
         if reply.drain {
             self.bell.ring(Leave::AfterBatch);
@@ -124,9 +124,8 @@ impl Beat<'_> {
     }
 
     fn drop_ended(&self) {
-        let ended = self.desk.drop_ended(Instant::now());
-        if ended > 0 {
-            tracing::warn!(leases = ended, "could not be renewed in time: dropped");
+        for errand in self.desk.drop_ended(Instant::now()) {
+            note!(warn, errand, "could not be renewed in time: dropped");
         }
     }
 

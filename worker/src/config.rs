@@ -1,5 +1,6 @@
 //! What a worker is told at its start.
 
+use ovtigre_proto::telemetry::traces::Traces;
 use std::path::PathBuf;
 
 /// What a worker is told at its start.
@@ -21,4 +22,6 @@ pub struct Config {
     pub cache_bytes: u64,
     /// Spreads the waits of many workers; nothing else depends on it.
     pub seed: u64,
+    /// Where spans go.
+    pub traces: Traces,
 }

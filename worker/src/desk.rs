@@ -1,13 +1,14 @@
 //! The batches that a worker holds.
 
+use crate::errand::Errand;
 use ovtigre_core::render::progress::Progress;
 use ovtigre_proto::{
-    id::LeaseId,
+    id::{LeaseId, WorkerId},
     lease::{Lease, LeaseProgress},
 };
 use std::{
     sync::{Arc, Mutex, MutexGuard, PoisonError},
-    time::{Duration, Instant},
+    time::{Duration, Instant, SystemTime},
 };
 use tokio::sync::Notify;
 
@@ -29,6 +30,10 @@ enum Stage {
 pub struct Work {
     /// What the farm said.
     pub lease: Lease,
+    /// Its names.
+    pub errand: Errand,
+    /// When it came.
+    pub came: SystemTime,
     /// How far it is; stopped where the result is not wanted any more.
     pub progress: Arc<Progress>,
 }
@@ -53,12 +58,14 @@ impl Desk {
         self.held.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Puts new batches on it.
-    pub fn add(&self, leases: Vec<Lease>, now: Instant) {
+    /// Puts new batches on it that were handed to `worker`.
+    pub fn add(&self, leases: Vec<Lease>, worker: &WorkerId, now: Instant) {
         let mut held = self.held();
         for lease in leases {
             let ends = now + duration(lease.seconds);
-            let work = Work { lease, progress: Arc::new(Progress::new()) };
+            let errand = Errand::new(&lease, worker.clone());
+            let (progress, came) = (Arc::new(Progress::new()), SystemTime::now());
+            let work = Work { lease, errand, came, progress };
             held.push(Held { work, stage: Stage::Waiting, ends });
         }
         self.came.notify_one();
@@ -98,13 +105,13 @@ impl Desk {
     }
 
     /// Stops and takes off the batches that `choose` names.
-    fn stop(&self, choose: impl Fn(&Held) -> bool) -> Vec<Lease> {
+    fn stop(&self, choose: impl Fn(&Held) -> bool) -> Vec<Errand> {
         let mut stopped = Vec::new();
         self.held().retain(|held| {
             let chosen = choose(held);
             if chosen {
                 held.work.progress.stop();
-                stopped.push(held.work.lease.clone());
+                stopped.push(held.work.errand.clone());
             }
             !chosen
         });
@@ -115,23 +122,23 @@ impl Desk {
     }
 
     /// Stops batches that the farm does not want any more.
-    pub fn drop_leases(&self, ids: &[LeaseId]) {
-        self.stop(|held| ids.contains(&held.work.lease.id));
+    pub fn drop_leases(&self, ids: &[LeaseId]) -> Vec<Errand> {
+        self.stop(|held| ids.contains(&held.work.lease.id))
     }
 
     /// Stops the batches that could not be renewed in time. Sums on their way go on: late ones may
     /// still be used.
-    pub fn drop_ended(&self, now: Instant) -> usize {
-        self.stop(|held| held.ends <= now && held.stage != Stage::Bringing).len()
+    pub fn drop_ended(&self, now: Instant) -> Vec<Errand> {
+        self.stop(|held| held.ends <= now && held.stage != Stage::Bringing)
     }
 
     /// Takes off those that are not begun.
-    pub fn take_waiting(&self) -> Vec<Lease> {
+    pub fn take_waiting(&self) -> Vec<Errand> {
         self.stop(|held| held.stage == Stage::Waiting)
     }
 
     /// Stops everything.
-    pub fn take_all(&self) -> Vec<Lease> {
+    pub fn take_all(&self) -> Vec<Errand> {
         self.stop(|_| true)
     }
 
@@ -181,16 +188,16 @@ mod tests {
     #[tokio::test]
     async fn what_is_held_is_rendered_in_order_and_dropped_when_it_ends() {
         let (desk, now) = (Desk::default(), Instant::now());
-        desk.add(vec![mock::lease(0, 10.0), mock::lease(1, 20.0)], now);
+        desk.add(vec![mock::lease(0, 10.0), mock::lease(1, 20.0)], &"worker".parse().unwrap(), now);
         assert_eq!(desk.wants(), 0);
         let (first, second) = (desk.next().await, desk.next().await);
         assert_eq!((first.lease.batch.block.index, second.lease.batch.block.index), (0, 1));
         desk.bringing(&first.lease.id);
         assert_eq!(desk.wants(), 1);
-        assert_eq!(desk.drop_ended(now + Duration::from_secs(19)), 0, "a sum on its way goes on");
+        assert_eq!(desk.drop_ended(now + Duration::from_secs(19)).len(), 0, "a sum on its way goes on");
         desk.renewed(&desk.holding(), now + Duration::from_secs(15));
-        assert_eq!(desk.drop_ended(now + Duration::from_secs(34)), 0);
-        assert_eq!(desk.drop_ended(now + Duration::from_secs(35)), 1);
+        assert_eq!(desk.drop_ended(now + Duration::from_secs(34)).len(), 0);
+        assert_eq!(desk.drop_ended(now + Duration::from_secs(35)).len(), 1);
         assert!(second.progress.is_stopped() && !first.progress.is_stopped());
         assert!(desk.remove(&first.lease.id) && !desk.remove(&first.lease.id));
         assert_eq!(desk.wants(), 2);

@@ -2,6 +2,7 @@
 
 use crate::{config::Config, leave::Leave};
 use clap::Args;
+use ovtigre_proto::telemetry::traces::Traces;
 use std::{num::NonZeroUsize, path::PathBuf, thread::available_parallelism};
 
 const GIB: u64 = 1 << 30;
@@ -48,7 +49,7 @@ impl WorkFlags {
 
     /// What they say, with what the machine says where they do not. `seed` spreads the waits of many
     /// workers.
-    pub fn config(&self, seed: u64) -> Config {
+    pub fn config(&self, seed: u64, traces: Traces) -> Config {
         let cores = available_parallelism().unwrap_or(NonZeroUsize::MIN);
         Config {
             server: self.server.clone(),
@@ -63,6 +64,7 @@ impl WorkFlags {
             cache: self.cache.clone().unwrap_or_else(cache_folder),
             cache_bytes: self.cache_size.saturating_mul(GIB),
             seed,
+            traces,
         }
     }
 }

@@ -3,6 +3,7 @@
 use crate::{
     bring::{Rendered, bring, give_back},
     desk::{BRINGING_MAX, Desk, Work},
+    errand::{Errand, note},
     leave::{Bell, Leave},
     prepared::{Key, Prepared},
     renderer::Renderer,
@@ -16,6 +17,7 @@ use ovtigre_proto::{
     client::farm::Client,
     id::BlobId,
     lease::{FailureKind, Lease},
+    telemetry::{span::Span, traces::Traces},
 };
 use rayon::ThreadPool;
 use std::{
@@ -48,6 +50,8 @@ pub struct Labour<R: Renderer> {
     pub desk: Arc<Desk>,
     /// Files on disk.
     pub scenes: Arc<SceneFolder>,
+    /// Where spans go.
+    pub traces: Traces,
     /// Scenes in memory.
     pub prepared: Mutex<Prepared<R::Scene>>,
     /// Turns batches into sums.
@@ -71,7 +75,7 @@ impl<R: Renderer> Labour<R> {
                 biased;
                 () = bell.wait(Leave::Now) => break,
                 rendered = self.clone().render(work) => if let Some(rendered) = rendered {
-                    bringing.spawn(bring(self.client.clone(), self.desk.clone(), rendered));
+                    bringing.spawn(bring(self.client.clone(), self.desk.clone(), self.traces.clone(), rendered));
                 }
             }
             while bringing.len() >= BRINGING_MAX && bell.heard() < Leave::Now {
@@ -91,16 +95,20 @@ impl<R: Renderer> Labour<R> {
         self.hand_back(self.desk.take_all()).await;
     }
 
-    async fn hand_back(&self, leases: Vec<Lease>) {
-        for lease in leases {
-            give_back(&self.client, &lease.id, FailureKind::HandedBack, "the worker leaves".to_owned()).await;
+    async fn hand_back(&self, errands: Vec<Errand>) {
+        for errand in errands {
+            give_back(&self.client, &errand, FailureKind::HandedBack, "the worker leaves".to_owned()).await;
         }
     }
 
     /// Renders a batch, or gives it back with the reason.
     async fn render(self: Arc<Self>, work: Work) -> Option<Rendered> {
-        let lease = work.lease.id.clone();
-        let result = match self.files(&work.lease).await {
+        let errand = work.errand.clone();
+        let mut span = errand.span(&self.traces).since(work.came);
+        let fetching = errand.part(&self.traces, "fetch");
+        let files = self.files(&work.lease).await;
+        drop(fetching);
+        let result = match files {
             Ok(files) => {
                 let labour = self.clone();
                 let batch = tokio::task::spawn_blocking(move || labour.batch(&work, files)).await;
@@ -110,15 +118,19 @@ impl<R: Renderer> Labour<R> {
         };
         match result {
             Ok(Some(rendered)) => {
-                self.desk.bringing(&lease);
-                Some(rendered)
+                self.desk.bringing(&errand.lease);
+                Some(Rendered { span, ..rendered })
             }
-            Ok(None) => None,
+            Ok(None) => {
+                span.add("ovtigre.dropped", true);
+                None
+            }
             Err(Failed { kind, reason }) => {
+                span.fail(&reason);
                 // Held until the farm knows why: what a worker does not hold any more is anybody's.
-                if self.desk.holds(&lease) {
-                    give_back(&self.client, &lease, kind, reason).await;
-                    self.desk.remove(&lease);
+                if self.desk.holds(&errand.lease) {
+                    give_back(&self.client, &errand, kind, reason).await;
+                    self.desk.remove(&errand.lease);
                 }
                 None
             }
@@ -143,8 +155,10 @@ impl<R: Renderer> Labour<R> {
 
     /// On a thread that may be blocked. `Ok(None)` where the batch was stopped.
     fn batch(&self, work: &Work, files: Option<Files>) -> Result<Option<Rendered>, Failed> {
-        let Lease { id, job, scene: scene_id, settings, batch, .. } = &work.lease;
+        let Lease { job, scene: scene_id, settings, batch, .. } = &work.lease;
         let scene = self.scene(&work.lease, files)?;
+        let _rendering = work.errand.part(&self.traces, "render");
+        note!(debug, work.errand, "renders");
         let start = Instant::now();
         let sum = self.pool.install(|| self.renderer.render(&scene, settings, *batch, &work.progress));
         let Some(sum) = sum else { return Ok(None) };
@@ -155,8 +169,8 @@ impl<R: Renderer> Labour<R> {
             solution: self.renderer.solution(&scene),
         };
         let seconds = start.elapsed().as_secs_f64();
-        let (lease, size, upload) = (id.clone(), settings.size, work.lease.upload.clone());
-        Ok(Some(Rendered { lease, sum, size, attributes, seconds, upload }))
+        let (errand, size, upload) = (work.errand.clone(), settings.size, work.lease.upload.clone());
+        Ok(Some(Rendered { errand, span: Span::default(), sum, size, attributes, seconds, upload }))
     }
 
     fn scene(&self, lease: &Lease, files: Option<Files>) -> Result<Arc<R::Scene>, Failed> {

@@ -1,9 +1,11 @@
 //! The program `ovtigre-worker`.
 
 use clap::Parser;
+use ovtigre_proto::telemetry::traces::Traces;
 use ovtigre_worker::{
     flags::{WorkFlags, usage},
     leave::Bell,
+    log::LogFlags,
     processor,
     run::run,
 };
@@ -18,9 +20,8 @@ use std::{
 struct Line {
     #[command(flatten)]
     work: WorkFlags,
-    /// What is logged to stderr, such as `info` or `ovtigre_worker=debug`.
-    #[arg(long, value_name = "FILTER", default_value = "info")]
-    log: String,
+    #[command(flatten)]
+    log: LogFlags,
 }
 
 fn main() -> ExitCode {
@@ -42,9 +43,7 @@ fn main() -> ExitCode {
 }
 
 fn work(line: &Line) -> anyhow::Result<()> {
-    let log = tracing_subscriber::fmt().with_env_filter(&line.log).with_writer(stderr);
-    // Where nobody reads it any more, there is nobody to be told, and no reason to fall.
-    log.log_internal_errors(false).init();
+    line.log.start();
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?;
     let result = runtime.block_on(async {
         let bell = Bell::default();
@@ -52,9 +51,10 @@ fn work(line: &Line) -> anyhow::Result<()> {
         if line.work.until_stdin_closes {
             tokio::spawn(bell.clone().ring_when_stdin_closes());
         }
-        run(line.work.config(u64::from(id())), bell).await
+        let traces = Traces::from_environment("ovtigre-worker")?;
+        anyhow::Ok(run(line.work.config(u64::from(id()), traces), bell).await?)
     });
     // A scene that is being prepared, or standard input, may keep a thread busy.
     runtime.shutdown_background();
-    Ok(result?)
+    result
 }

@@ -23,6 +23,7 @@ use ovtigre_proto::{
     client::farm::Client,
     id::{BlobId, LeaseId, WorkerId},
     lease::{Commit, Committed, Exchange, ExchangeReply, Lease, LeaseFailure, WorkerJoin, WorkerJoined},
+    telemetry::traces::Traces,
 };
 use std::{
     collections::BTreeMap,
@@ -184,6 +185,7 @@ impl MockFarm {
             cache,
             cache_bytes: 1 << 20,
             seed: 1,
+            traces: Traces::default(),
         }
     }
 }

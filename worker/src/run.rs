@@ -70,6 +70,7 @@ pub async fn run_with<R: Renderer>(config: Config, renderer: R, bell: Bell) -> R
         client: client.clone(),
         desk: desk.clone(),
         scenes: scenes.clone(),
+        traces: config.traces.clone(),
         prepared: Mutex::new(Prepared::default()),
         renderer,
         pool,
@@ -83,11 +84,12 @@ pub async fn run_with<R: Renderer>(config: Config, renderer: R, bell: Bell) -> R
         () = too_late(bell) => {}
     }
     let id = id.borrow().clone();
-    if let Some(id) = id {
+    if let Some(id) = &id {
         let farewell = Exchange { leaving: true, ..Exchange::default() };
-        tokio::time::timeout(HASTE, client.exchange(&id, &farewell)).await.ok();
+        tokio::time::timeout(HASTE, client.exchange(id, &farewell)).await.ok();
     }
-    tracing::info!("left");
+    tracing::info!(worker = id.as_ref().map(ToString::to_string), "left");
+    config.traces.stop().await;
     Ok(())
 }
 

@@ -11,7 +11,7 @@ pub fn provide() {
 
 /// A client as `builder` says. On a machine that trusts no certificate at all it still speaks to farms that do not
 /// encrypt.
-pub(super) fn client(builder: impl Fn() -> ClientBuilder) -> Result<Client, Error> {
+pub(crate) fn client(builder: impl Fn() -> ClientBuilder) -> Result<Client, Error> {
     provide();
     builder().build().or_else(|_| builder().tls_certs_only([]).build())
 }

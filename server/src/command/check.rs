@@ -145,7 +145,7 @@ fn cameras(contents: &Contents) -> String {
     let names = contents.report.camera_names.iter().enumerate();
     let shown: Vec<String> = names
         .map(|(i, name)| {
-            let called = if name.is_empty() { i.to_string() } else { format!("{i} '{name}'") };
+            let called = if name.is_empty() { format!("number {i}") } else { format!("number {i} '{name}'") };
             match contents.aspects.get(i).copied().flatten() {
                 Some(aspect) => format!("{called} ({aspect:.3}:1)"),
                 None => called,

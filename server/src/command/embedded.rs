@@ -8,6 +8,7 @@ use ovtigre::{
     farm::rules::Rules,
     serve::{ServeConfig, Serving, start},
 };
+use ovtigre_proto::telemetry::traces::Traces;
 use std::{
     net::{Ipv4Addr, SocketAddr},
     num::NonZeroUsize,
@@ -54,7 +55,8 @@ impl Embedded {
         let cache = data.join("worker-scenes");
         let listen = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
         let rules = Rules { kept_sums_bytes, ..Rules::default() };
-        let config = ServeConfig { rules, ..ServeConfig::new(listen, data) };
+        let traces = Traces::from_environment("ovtigre-server")?;
+        let config = ServeConfig { rules, traces, ..ServeConfig::new(listen, data) };
         let serving = start(config).await.map_err(|e| CommandError::wrong(e.to_string()))?;
         let threads = plan.threads.map_or_else(|| share_of_cores(plan.workers), NonZeroUsize::get);
         let farm = serving.address;

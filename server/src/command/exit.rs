@@ -1,6 +1,6 @@
 //! How a command ends, and why.
 
-use ovtigre_proto::client::error::ClientError;
+use ovtigre_proto::{client::error::ClientError, telemetry::traces::TracesError};
 use std::process::ExitCode;
 
 /// How a command ends where it does not end well.
@@ -48,6 +48,12 @@ impl CommandError {
     /// Stopped before done.
     pub(crate) fn stopped(line: impl Into<String>) -> Self {
         Self { exit: Exit::Stopped, line: line.into() }
+    }
+}
+
+impl From<TracesError> for CommandError {
+    fn from(error: TracesError) -> Self {
+        Self::wrong(error.to_string())
     }
 }
 

@@ -4,6 +4,7 @@ use super::{
     exit::{CommandError, Outcome},
     terminal,
 };
+use ovtigre_worker::log::{LogFlags, LogFormat};
 use std::{
     collections::VecDeque,
     net::SocketAddr,
@@ -47,12 +48,12 @@ pub(crate) struct Team {
 }
 
 /// What becomes of what workers write to standard error.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 pub(crate) enum WorkerLog {
     /// Shown only if they fail.
     Kept,
-    /// Shown.
-    Shown,
+    /// Shown, as that of the command itself.
+    Shown(LogFlags),
 }
 
 /// Worker processes; they end with this value, and with this process however it ends.
@@ -172,6 +173,9 @@ impl Watched {
             .stdout(Stdio::null())
             .stderr(Stdio::piped())
             .kill_on_drop(true);
+        if let WorkerLog::Shown(LogFlags { filter, format }) = &self.team.log {
+            command.args(["--log", filter]).args(["--log-format", &format.to_string()]);
+        }
         match &self.team.token {
             Some(token) => command.env("OVTIGRE_TOKEN", token),
             None => command.env_remove("OVTIGRE_TOKEN"),
@@ -181,7 +185,7 @@ impl Watched {
         command.process_group(0);
         let mut child = command.spawn()?;
         if let Some(stderr) = child.stderr.take() {
-            tokio::spawn(keep(stderr, self.number, self.team.log, self.lines.clone()));
+            tokio::spawn(keep(stderr, self.number, self.team.log.clone(), self.lines.clone()));
         }
         Ok(child)
     }
@@ -209,7 +213,7 @@ impl Watched {
 
     fn last_words(&self) -> String {
         let lines = self.lines.lock().unwrap_or_else(PoisonError::into_inner);
-        if self.team.log == WorkerLog::Shown || lines.is_empty() {
+        if matches!(self.team.log, WorkerLog::Shown(_)) || lines.is_empty() {
             return String::new();
         }
         format!("; its last words: {}", lines.iter().cloned().collect::<Vec<_>>().join(" | "))
@@ -219,8 +223,12 @@ impl Watched {
 async fn keep(stderr: ChildStderr, number: u32, log: WorkerLog, kept: Arc<Mutex<VecDeque<String>>>) {
     let mut lines = BufReader::new(stderr).lines();
     while let Ok(Some(line)) = lines.next_line().await {
-        if log == WorkerLog::Shown {
-            terminal::remark(&format!("worker {number}: {line}"));
+        match &log {
+            WorkerLog::Shown(LogFlags { format: LogFormat::Text, .. }) => {
+                terminal::remark(&format!("worker {number}: {line}"));
+            }
+            WorkerLog::Shown(_) => terminal::remark(&line),
+            WorkerLog::Kept => {}
         }
         let mut kept = kept.lock().unwrap_or_else(PoisonError::into_inner);
         kept.push_back(line.chars().take(300).collect());

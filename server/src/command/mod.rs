@@ -22,6 +22,8 @@ mod manual;
 mod output;
 mod pause;
 mod progress;
+#[cfg(test)]
+mod reference;
 mod render;
 mod report;
 mod resume;

@@ -10,10 +10,10 @@ use super::{
     local_workers::WorkerLog,
     progress::{Others, Progress},
     submission::Submission,
-    terminal,
 };
 use clap::Args;
 use ovtigre_proto::client::farm::Client;
+use ovtigre_worker::log::{LogFlags, LogFormat};
 use std::{num::NonZeroUsize, path::PathBuf};
 
 /// Render a scene.
@@ -47,7 +47,9 @@ pub(crate) struct Render {
 impl Render {
     /// Renders.
     pub(crate) async fn run(self) -> Outcome {
-        terminal::log(if self.verbose { "info" } else { "error" });
+        let filter = if self.verbose { "info" } else { "error" };
+        let log = LogFlags { filter: filter.to_owned(), format: LogFormat::Text };
+        log.start();
         let interrupt = Interrupt::listen();
         let mut submission = Submission::read(&self.scene, self.job).await?;
         let others = if self.verbose { Others::Log } else { Others::None };
@@ -59,7 +61,7 @@ impl Render {
             workers: self.workers,
             threads: self.threads,
             data: self.data,
-            log: if self.verbose { WorkerLog::Shown } else { WorkerLog::Kept },
+            log: if self.verbose { WorkerLog::Shown(log) } else { WorkerLog::Kept },
         };
         let farm = Embedded::start(plan).await?;
         let client = farm_flags::client(&farm.address(), None)?;

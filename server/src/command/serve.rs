@@ -15,6 +15,8 @@ use ovtigre::{
     store::{Store as _, sql::Sql},
     webhook::Reach,
 };
+use ovtigre_proto::telemetry::traces::Traces;
+use ovtigre_worker::log::LogFlags;
 use std::{
     net::{IpAddr, SocketAddr},
     num::NonZeroUsize,
@@ -83,9 +85,8 @@ pub(crate) struct Serve {
     /// Listen on other addresses than loopback although anyone who reaches them may do anything.
     #[arg(long)]
     insecure: bool,
-    /// What is logged to stderr: error, warn, info, debug or trace, also for one part such as ovtigre=debug.
-    #[arg(long, value_name = "FILTER", default_value = "info")]
-    log: String,
+    #[command(flatten)]
+    log: LogFlags,
 }
 
 fn share(text: &str) -> Result<f64, String> {
@@ -101,7 +102,8 @@ fn not_negative(text: &str) -> Result<f64, String> {
 impl Serve {
     /// Serves until it is interrupted.
     pub(crate) async fn run(self) -> Outcome {
-        terminal::log(&self.log);
+        self.log.start();
+        let traces = Traces::from_environment("ovtigre-server")?;
         let interrupt = Interrupt::listen();
         let cache = self.data.join("worker-scenes");
         // A password in the environment is not in the list of processes.
@@ -146,6 +148,7 @@ impl Serve {
             guarding,
             tls,
             own_port,
+            traces,
         };
         let serving = start(config).await.map_err(|e| CommandError::wrong(e.to_string()))?;
         terminal::result(&format!("{scheme}://{}", serving.address));
@@ -155,7 +158,7 @@ impl Serve {
             farm: reachable(serving.own.unwrap_or(serving.address)),
             token: Some(own_token),
             cache,
-            log: WorkerLog::Shown,
+            log: WorkerLog::Shown(self.log),
         })?;
         let lost =
             async { if self.workers == 0 { std::future::pending().await } else { workers.lost().await } };

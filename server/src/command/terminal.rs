@@ -28,13 +28,3 @@ pub(crate) fn error(line: &str) {
 pub(crate) fn is_watched() -> bool {
     stderr().is_terminal()
 }
-
-/// Logs what `filter` lets through to standard error.
-pub(crate) fn log(filter: &str) {
-    let filter = tracing_subscriber::EnvFilter::new(filter);
-    let log = tracing_subscriber::fmt().with_env_filter(filter).with_ansi(is_watched()).with_writer(stderr);
-    // Where nobody reads it any more, there is nobody to be told, and no reason to fall.
-    let log = log.log_internal_errors(false);
-    // A second call, as in tests, changes nothing.
-    log.try_init().ok();
-}

@@ -1,14 +1,12 @@
 //! `ovtigre work`: a worker.
 
-use super::{
-    exit::{CommandError, Outcome},
-    terminal,
-};
+use super::exit::{CommandError, Outcome};
 use clap::Args;
-use ovtigre_proto::client::error::ClientError;
+use ovtigre_proto::{client::error::ClientError, telemetry::traces::Traces};
 use ovtigre_worker::{
     flags::WorkFlags,
     leave::Bell,
+    log::LogFlags,
     run::{WorkerError, run},
 };
 
@@ -17,21 +15,21 @@ use ovtigre_worker::{
 pub(crate) struct Work {
     #[command(flatten)]
     work: WorkFlags,
-    /// What is logged to stderr: error, warn, info, debug or trace, also for one part such as `ovtigre_worker=debug`.
-    #[arg(long, value_name = "FILTER", default_value = "info")]
-    log: String,
+    #[command(flatten)]
+    log: LogFlags,
 }
 
 impl Work {
     /// Works.
     pub(crate) async fn run(self) -> Outcome {
-        terminal::log(&self.log);
+        self.log.start();
+        let traces = Traces::from_environment("ovtigre-worker")?;
         let bell = Bell::default();
         tokio::spawn(bell.clone().ring_on_signals(self.work.first_signal()));
         if self.work.until_stdin_closes {
             tokio::spawn(bell.clone().ring_when_stdin_closes());
         }
-        let config = self.work.config(u64::from(std::process::id()));
+        let config = self.work.config(u64::from(std::process::id()), traces);
         run(config, bell).await.map_err(|error| match error {
             WorkerError::Refused(error @ ClientError::Unexpected { .. }) => error.into(),
             other => CommandError::wrong(other.to_string()),

@@ -18,14 +18,20 @@ use ovtigre_core::{
 use ovtigre_proto::{
     curve::{CurveRow, LayerError},
     status::JobState,
+    telemetry::span::Place,
 };
 
 impl Farm {
     /// All lanes are at a checkpoint: its row of the curve is written down. Says how the job ends,
     /// where it ends here.
     pub(super) async fn look(&self, live: &Live, held: Held) -> Result<(Held, Option<Ending>)> {
+        let mut span = self.traces.span("checkpoint", Place::OfJob(&live.id));
         let (mut held, found) = measure(live, held).await?;
         let row = self.take_row(live, &mut held, found).await?;
+        span.add("ovtigre.samples", i64::from(row.samples));
+        if let Some(error) = row.relative_error {
+            span.add("ovtigre.relative_error", error);
+        }
         let merge = held.as_ref().expect("loaded by the caller");
         let reached = live.spec.error_target.is_some_and(|target| {
             let under = row.relative_error_upper.is_some_and(|upper| upper <= target);

@@ -23,6 +23,7 @@ use ovtigre_core::{
 use ovtigre_proto::{
     id::{BlobId, JobId, LeaseId, WorkerId},
     lease::{Commit, FailureKind, LeaseFailure},
+    telemetry::span::Place,
 };
 use std::{collections::BTreeSet, sync::Arc, time::Duration};
 
@@ -79,8 +80,40 @@ impl Farm {
         time: Duration,
         way: Way,
     ) -> Result<Commit> {
-        self.need_room_for_sums()?;
         let (job, key) = batch_of(lease).ok_or_else(|| FarmError::not_found("lease", lease))?;
+        // Of a lease that has ended nobody remembers whose it was.
+        let worker = self.book().lease(lease).map(|held| held.row.worker.clone());
+        let mut span = self.traces.span("commit", Place::OfLease(&job, lease));
+        if span.is_told() {
+            span.add("ovtigre.batch", key.to_string());
+            if let Some(worker) = &worker {
+                span.add("ovtigre.worker", worker.to_string());
+            }
+        }
+        let worker = worker.as_ref().map(WorkerId::as_str);
+        let taken = self.take_sum_of(lease, (job.clone(), key), partial, time, way).await;
+        match &taken {
+            Ok(commit) => {
+                tracing::debug!(%job, batch = %key, %lease, worker, ?commit, "a sum came");
+                span.add("ovtigre.commit", format!("{commit:?}").to_lowercase());
+            }
+            Err(error) => {
+                tracing::debug!(%job, batch = %key, %lease, worker, %error, "a sum was not taken");
+                span.fail(&error.to_string());
+            }
+        }
+        taken
+    }
+
+    async fn take_sum_of(
+        self: &Arc<Self>,
+        lease: &LeaseId,
+        (job, key): (JobId, BatchKey),
+        partial: Bytes,
+        time: Duration,
+        way: Way,
+    ) -> Result<Commit> {
+        self.need_room_for_sums()?;
         let Some(live) = self.wanted(lease, &job).await? else {
             self.counters.count(Fate::NotNeeded);
             return Ok(Commit::NotNeeded);

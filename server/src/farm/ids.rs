@@ -59,15 +59,8 @@ impl Default for Ids {
 
 /// The batch that a lease was for.
 pub fn batch_of(lease: &LeaseId) -> Option<(JobId, BatchKey)> {
-    let mut parts = lease.as_str().rsplitn(5, '_');
-    let (_nonce, block, replicate, region) = (parts.next()?, parts.next()?, parts.next()?, parts.next()?);
-    let job = parts.next()?.parse().ok()?;
-    let batch = BatchKey {
-        block: block.parse().ok()?,
-        replicate: replicate.parse().ok()?,
-        region: region.parse().ok()?,
-    };
-    Some((job, batch))
+    let (job, [region, replicate, block]) = lease.batch()?;
+    Some((job, BatchKey { block, replicate, region }))
 }
 
 #[cfg(test)]

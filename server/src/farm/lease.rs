@@ -17,12 +17,13 @@ use ovtigre_proto::{
     id::{JobId, LeaseId, WorkerId},
     lease::{Exchange, ExchangeReply, FailureKind, Lease, LeaseFailure, WorkerJoin},
     status::WorkerState,
+    telemetry::span::Place,
 };
 use std::{
     collections::BTreeSet,
     pin::pin,
     sync::Arc,
-    time::{Duration, Instant},
+    time::{Duration, Instant, SystemTime},
 };
 
 /// Where a sum may be put directly, that is so for so long after its lease was given.
@@ -181,6 +182,7 @@ impl Farm {
     /// Claims what the book offers; also returns the jobs of whose batches some were refused.
     async fn claim_offers(&self, asker: &Asker<'_>) -> Result<(Vec<Lease>, BTreeSet<JobId>)> {
         let Asker { id: worker, join, .. } = *asker;
+        let asked = SystemTime::now();
         // Twice what workers hold or would take: none stands idle while a checkpoint is taken.
         let ahead = 2 * self.crew().capacity(self.rules.silence);
         let offers = self.book().offer(asker, ahead);
@@ -211,6 +213,7 @@ impl Farm {
             let Offer { job, batch: key, scene, settings, audit, .. } = offer;
             let upload = if audit.is_some() { None } else { self.upload_to(&id).await };
             let row = LeaseRow { id: id.clone(), job: job.clone(), batch: key, worker: worker.clone() };
+            self.tell_handed_out(&row, asked);
             self.book().hold(row, audit, asker.beat);
             let seconds = self.rules.lease.as_secs_f64();
             leases.push(Lease {
@@ -227,6 +230,15 @@ impl Farm {
         begun.dedup();
         begun.iter().filter_map(|job| self.live(job)).for_each(|live| live.changed());
         Ok((leases, refused))
+    }
+
+    fn tell_handed_out(&self, lease: &LeaseRow, asked: SystemTime) {
+        let LeaseRow { id, job, batch, worker } = lease;
+        tracing::debug!(%job, %batch, lease = %id, %worker, "a batch was handed out");
+        let span = self.traces.span("hand out", Place::OfLease(job, id)).since(asked);
+        if span.is_told() {
+            drop(span.note("ovtigre.batch", batch.to_string()).note("ovtigre.worker", worker.to_string()));
+        }
     }
 
     /// Where a lease's sum may be put directly.
@@ -317,7 +329,14 @@ impl Farm {
     /// several workers, where there are several.
     pub(super) async fn judge(&self, released: &Released, kind: FailureKind, reason: &str) -> Result<()> {
         let Released { lease, failures, workers, losses } = released;
-        tracing::warn!(lease = %lease.id, worker = %lease.worker, failures, losses, reason, "a batch came back");
+        let LeaseRow { id, job, batch, worker } = lease;
+        tracing::warn!(%job, %batch, lease = %id, %worker, failures, losses, reason, "a batch came back");
+        let span = self.traces.span("come back", Place::OfLease(job, id));
+        if span.is_told() {
+            let mut span =
+                span.note("ovtigre.batch", batch.to_string()).note("ovtigre.worker", worker.to_string());
+            span.fail(reason);
+        }
         let all = self.crew().active(self.rules.silence).max(1);
         let jobs_fault = kind == FailureKind::Job
             && *failures >= self.rules.failing_workers

@@ -53,7 +53,7 @@ use crew::Crew;
 use error::{FarmError, Result};
 use ids::Ids;
 use live::{Live, held};
-use ovtigre_proto::id::JobId;
+use ovtigre_proto::{id::JobId, telemetry::traces::Traces};
 use rules::Rules;
 use scene::Inspect;
 use std::{
@@ -73,6 +73,8 @@ pub struct Farm {
     pub rules: Rules,
     /// What it counts.
     pub counters: Counters,
+    /// Where spans go.
+    pub traces: Traces,
     /// Cancelled when it stops.
     pub stopping: CancellationToken,
     /// Its name among the servers over the same store.

@@ -15,7 +15,7 @@ use crate::{
     store::{Store, row::JobRow},
     webhook::Messenger,
 };
-use ovtigre_proto::status::JobState;
+use ovtigre_proto::{status::JobState, telemetry::traces::Traces};
 use std::{
     collections::btree_map::Entry,
     num::NonZero,
@@ -37,6 +37,7 @@ impl Farm {
         blobs: Blobs,
         inspect: Inspect,
         rules: Rules,
+        traces: Traces,
     ) -> Result<Arc<Self>> {
         let processors = available_parallelism().map_or(1, NonZero::get);
         let ids = super::ids::Ids::new();
@@ -45,6 +46,7 @@ impl Farm {
             store,
             blobs,
             rules,
+            traces,
             name: ids.text(16),
             counters: super::counters::Counters::default(),
             stopping: tokio_util::sync::CancellationToken::new(),

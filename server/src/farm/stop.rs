@@ -11,7 +11,7 @@ use crate::{
     fail_point::FailPoint,
     store::row::{JobChange, JobRow, Settlement},
 };
-use ovtigre_proto::{id::JobId, status::JobState};
+use ovtigre_proto::{id::JobId, status::JobState, telemetry::span::Place};
 use std::sync::Arc;
 
 /// Whether the wish to end can be followed now.
@@ -55,12 +55,11 @@ impl Farm {
                 self.forget_live(&live.id);
                 return Ok(self.blobs.delete_all(&BlobFolder::Job(live.id.clone())).await?);
             }
-            done => done.map(drop)?,
+            done => self.tell_over(&done?),
         }
         FailPoint::EndAfterRow.pass();
         self.forget_live(&live.id);
         live.changed();
-        tracing::info!(job = %live.id, state = ending.state.name(), reason = ending.reason, "job is over");
         self.remove_leftovers(&live.id).await
     }
 
@@ -80,9 +79,25 @@ impl Farm {
             })
         };
         self.drop_sums(live).await?;
-        self.change(&live.id, change).await?;
+        self.tell_over(&self.change(&live.id, change).await?);
         self.forget_live(&live.id);
         self.remove_leftovers(&live.id).await
+    }
+
+    /// A job is over, and its files have their last form.
+    fn tell_over(&self, row: &JobRow) {
+        let JobRow { id, state, reason, .. } = row;
+        tracing::info!(job = %id, state = state.name(), reason, "job is over");
+        let span = self.traces.span("job", Place::Job(id)).since(row.created_at.into());
+        if span.is_told() {
+            let span =
+                span.note("ovtigre.name", row.name.clone()).note("ovtigre.scene", row.scene.to_string());
+            let mut span =
+                span.note("ovtigre.state", state.name()).note("ovtigre.samples", row.progress.samples);
+            if *state == JobState::Failed {
+                span.fail(reason.as_deref().unwrap_or_default());
+            }
+        }
     }
 
     /// Removes partials of a job that is over, and its sums unless they are kept.

@@ -33,8 +33,9 @@ use ovtigre_proto::{
     problem::Fault,
     scene::{SceneContent, SceneContents, SceneReport},
     status::JobStatus,
+    telemetry::span::Place,
 };
-use std::sync::Arc;
+use std::{sync::Arc, time::SystemTime};
 
 /// Samples a pixel of a job, at most.
 pub(super) const SAMPLES_MAX: u32 = 1 << 22;
@@ -119,6 +120,7 @@ impl Farm {
         key: Option<String>,
         owner: Option<String>,
     ) -> Result<JobStatus> {
+        let came = SystemTime::now();
         if key.as_ref().is_some_and(|key| key.is_empty() || key.len() > KEY_MAX) {
             let detail = format!("the idempotency key has 1 to {KEY_MAX} bytes");
             return Err(FarmError::Request(vec![fault("", detail)]));
@@ -157,6 +159,8 @@ impl Farm {
                 FailPoint::JobAfterRow.pass();
                 let row = self.job_row(&id).await?;
                 tracing::info!(job = %id, name = row.name, "job taken");
+                let span = self.traces.span("submit", Place::OfJob(&id)).since(came);
+                let _span = span.note("ovtigre.scene", row.scene.to_string());
                 self.take_up(&row).await?;
                 self.status_of(&row).await
             }

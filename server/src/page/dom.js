@@ -37,6 +37,23 @@ export function fill(node, ...children) {
   return put(node, children);
 }
 
+/**
+ * Makes a node's children what is given, and keeps those that look the same already, cells of rows each for itself: what is pressed,
+ * focused or selected meanwhile stays. A kept child keeps its listeners too, which must not depend on when they were made.
+ */
+export function renew(node, ...children) {
+  const wanted = [...put(document.createDocumentFragment(), children).childNodes];
+  const present = [...node.childNodes];
+  for (const extra of present.slice(wanted.length)) extra.remove();
+  wanted.forEach((child, i) => {
+    const old = present[i];
+    if (!old) node.append(child);
+    else if (old.nodeName === 'TR' && child.nodeName === 'TR') renew(old, [...child.childNodes]);
+    else if (!old.isEqualNode(child)) old.replaceWith(child);
+  });
+  return node;
+}
+
 /** Replaces a node's text where it is another, so that nothing moves where nothing changed. */
 export function text(node, value) {
   const now = String(value ?? '');

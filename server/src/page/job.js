@@ -1,7 +1,7 @@
 // A job: its picture, how good it is and will be, who works at it, what was left out, and what can be done with it.
 
 import { events, get, save, send, token } from './client.js';
-import { asked, confirmed, el, fill, notice, pause, repeat, text } from './dom.js';
+import { asked, confirmed, el, fill, notice, pause, renew, repeat, text } from './dom.js';
 import { count, digits, errorOf, part, percent, samples, seconds, short, when } from './format.js';
 import { badge } from './jobs.js';
 import { plot, table } from './plot.js';
@@ -186,7 +186,7 @@ class JobView {
     const over = OVER.includes(job.state);
     const button = (title, act, kind) => el('button', { type: 'button', class: kind ?? null, onclick: act }, title);
     const paused = job.state === 'paused';
-    fill(this.actions,
+    renew(this.actions,
       over ? null : paused ? button('Resume', () => this.patch({ state: 'running' }), 'primary') : button('Pause', () => this.patch({ state: 'paused' })),
       job.state !== 'failed' && job.state !== 'cancelled' && !job.certified ? button('More samples', () => this.#more()) : null,
       job.state !== 'failed' && job.state !== 'cancelled' && job.settings.replicates > 2 ? button('Tighter error', () => this.#tighter()) : null,
@@ -255,7 +255,7 @@ class JobView {
     fill(this.plot, plot(curve, this.axis, Math.max(280, this.plot.clientWidth)));
     fill(this.curveTable, table(curve));
     const facts = [
-      curve.slope === null ? null : `slope ${curve.slope.toFixed(2)} (−0.50 is plain Monte Carlo)`,
+      curve.slope === null ? null : `slope ${curve.slope.toFixed(2).replace('-', '−')} (−0.50 is plain Monte Carlo)`,
       curve.efficiency === null ? null : `efficiency ${digits(curve.efficiency)} 1/s`,
       curve.target_expected_at_seconds !== null && !curve.certified ? `target expected at ${seconds(curve.target_expected_at_seconds)} of run time` : null,
       curve.certified ? 'target reached and certified' : null,
@@ -272,7 +272,7 @@ class JobView {
   async loadWorkers() {
     const all = await allWorkers(this.signal).catch(() => []);
     const here = all.filter((worker) => worker.job === this.job.id && worker.leases > 0);
-    fill(this.workers, here.map((worker) => workerRow(worker, null)));
+    renew(this.workers, here.map((worker) => workerRow(worker, null)));
     this.nobody.hidden = here.length > 0;
     this.workers.parentNode.parentNode.hidden = here.length === 0;
   }

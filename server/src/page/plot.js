@@ -14,7 +14,7 @@ function scale(low, high, from, to) {
   const [a, b] = [Math.log10(low), Math.log10(high)];
   const place = (x) => from + ((Math.log10(x) - a) / (b - a)) * (to - from);
   const marks = [];
-  const few = b - a < 1.2 ? [1, 2, 5] : [1];
+  const few = b - a < 2.2 ? [1, 2, 5] : [1];
   for (let decade = Math.floor(a); decade <= Math.ceil(b); decade += 1) {
     for (let n = 1; n < 10; n += 1) {
       const value = n * 10 ** decade;
@@ -64,16 +64,18 @@ export function plot(curve, axis, width) {
     if (named) drawing.append(svg('text', { x: LEFT - 7, y: here + 4, 'text-anchor': 'end' }, `${Number((value * 100).toPrecision(2))}\u00a0%`));
   }
   drawing.append(svg('rect', { x: LEFT, y: TOP, width: width - LEFT - RIGHT, height: height - TOP - BOTTOM, class: 'frame' }));
+  // Over all lines, so that none goes through them.
+  const labels = [];
   if (target) {
     const here = y.place(target);
     drawing.append(svg('line', { x1: LEFT, x2: width - RIGHT, y1: here, y2: here, class: 'target' }));
-    drawing.append(svg('text', { x: LEFT + 6, y: here - 6, class: 'target' }, `target ${percent(target)}`));
+    labels.push(svg('text', { x: LEFT + 6, y: here - 6, class: 'target' }, `target ${percent(target)}`));
   }
   if (expected && target && last.relative_error_upper > 0) {
     const end = x.place(expected);
     drawing.append(svg('line', { x1: x.place(last[axis]), y1: y.place(last.relative_error_upper), x2: end, y2: y.place(target), class: 'ahead' }));
     drawing.append(svg('line', { x1: end, x2: end, y1: TOP, y2: height - BOTTOM, class: 'ahead' }));
-    drawing.append(svg('text', { x: end - 6, y: TOP + 14, 'text-anchor': 'end', class: 'ahead' }, `expected at ${seconds(expected)}`));
+    labels.push(svg('text', { x: end - 6, y: TOP + 14, 'text-anchor': 'end', class: 'ahead' }, `expected at ${seconds(expected)}`));
   }
   for (const row of rows) {
     if (!(row.relative_error_upper > 0)) continue;
@@ -86,7 +88,7 @@ export function plot(curve, axis, width) {
     drawing.append(svg('circle', { cx, cy, r: 3.2, class: 'dot' },
       svg('title', {}, `${row.samples} samples, ${seconds(row[axis])}: ${percent(row.relative_error)}${row.relative_error_upper ? `, at most ${percent(row.relative_error_upper)}` : ''}`)));
   }
-  drawing.append(
+  drawing.append(...labels,
     svg('text', { x: (LEFT + width - RIGHT) / 2, y: height - 6, 'text-anchor': 'middle', class: 'title' }, axis === 'wall_seconds' ? 'run time' : 'time of all workers'));
   return drawing;
 }

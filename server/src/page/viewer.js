@@ -65,7 +65,7 @@ export class Viewer {
     this.line = el('div', { class: 'line', hidden: true });
     this.space = el('div', { class: 'space' }, this.#a.canvas, this.#b.canvas, this.mark);
     this.stage = el('div', { class: 'stage', tabindex: 0, role: 'img', 'data-keys': true, 'aria-label': 'The picture so far', 'aria-describedby': 'stage-keys',
-      onkeydown: (event) => this.#key(event), onwheel: (event) => this.#wheel(event), onpointerdown: (event) => this.#drag(event), onpointermove: (event) => this.#point(event), onpointerleave: () => this.#leave() },
+      onkeydown: (event) => this.#key(event), onwheel: (event) => this.#wheel(event), onpointerdown: (event) => this.#drag(event), onpointermove: (event) => this.#point(event) },
       this.space, this.line, this.message);
     this.stage.addEventListener('dblclick', (event) => this.#zoomAt(this.#zoom > 1 ? 1 : 4, event));
     this.level = el('output', { class: 'level' }, 'fit');
@@ -310,12 +310,6 @@ export class Viewer {
     const y = Math.floor((event.clientY - box.top - this.#y) / this.scale);
     if (x < 0 || y < 0 || x >= region.width || y >= region.height) return;
     this.#see(x + region.x, y + region.y);
-  }
-
-  #leave() {
-    if (document.activeElement === this.stage) return;
-    this.#at = null;
-    this.#place();
   }
 
   #see(x, y) {

@@ -1,7 +1,7 @@
 // Who renders: how fast, on what, what failed, who was put aside and why; and how many more there could be.
 
 import { get, send } from './client.js';
-import { confirmed, el, fill, notice, repeat, text } from './dom.js';
+import { confirmed, el, fill, notice, renew, repeat, text } from './dom.js';
 import { count, seconds, short, since, when } from './format.js';
 
 const PACE = 2000;
@@ -63,7 +63,7 @@ export async function show(root, { signal }) {
   const drain = (worker) => {
     if (!['active', 'aside', 'lost'].includes(worker.state)) return null;
     const title = worker.state === 'lost' ? 'Let go' : 'Drain';
-    return el('button', { type: 'button', class: 'small', 'aria-label': `${title} ${worker.name}`, onclick: async () => {
+    return el('button', { type: 'button', class: 'small', 'aria-label': `${title} ${worker.name}`, 'data-worker': worker.id, onclick: async () => {
       if (!await confirmed(`${title} ${worker.name}? It gets no more batches.`, title)) return;
       try {
         await send(`/v1/workers/${worker.id}`, { method: 'DELETE' });
@@ -79,9 +79,7 @@ export async function show(root, { signal }) {
     try {
       const [workers, scaling] = await Promise.all([allWorkers(signal), get('/v1/scaling', { signal })]);
       const shown = workers.filter((worker) => gone.checked || worker.state !== 'gone');
-      const focused = document.activeElement?.getAttribute('aria-label');
-      fill(body, shown.map((worker) => workerRow(worker, drain)));
-      if (focused) [...body.querySelectorAll('button')].find((button) => button.getAttribute('aria-label') === focused)?.focus();
+      renew(body, shown.map((worker) => workerRow(worker, drain)));
       empty.hidden = shown.length > 0;
       text(facts.active, count(scaling.active_workers));
       text(facts.desired, count(scaling.desired_workers));

@@ -18,6 +18,7 @@ use ovtigre_proto::{
     lease::{Commit, Exchange, Lease, LeaseProgress, WorkerJoin},
     scene::{SceneContent, SceneContents},
     status::{JobState, JobStatus},
+    telemetry::traces::Traces,
 };
 use std::{path::Path, sync::Arc, time::Duration};
 use tempfile::TempDir;
@@ -49,7 +50,7 @@ pub(crate) fn rules() -> Rules {
 async fn open(folder: &TempDir, rules: Rules) -> Arc<Farm> {
     let store = Arc::new(Sql::file(&folder.path().join("farm.sqlite")).await.unwrap());
     let blobs = Blobs::folder(&folder.path().join("blobs")).unwrap();
-    Farm::open(store, blobs, inspect(), rules).await.unwrap()
+    Farm::open(store, blobs, inspect(), rules, Traces::default()).await.unwrap()
 }
 
 fn inspect() -> Inspect {
@@ -76,7 +77,7 @@ impl Bench {
     pub(crate) async fn replica(database: &str, folder: &Path, rules: Rules) -> Self {
         let store = Arc::new(Sql::server(database).await.unwrap());
         let blobs = Blobs::folder(folder).unwrap();
-        let farm = Farm::open(store, blobs, inspect(), rules.clone()).await.unwrap();
+        let farm = Farm::open(store, blobs, inspect(), rules.clone(), Traces::default()).await.unwrap();
         Self { farm, rules, folder: tempfile::tempdir().unwrap() }
     }
 
