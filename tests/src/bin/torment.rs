@@ -1,5 +1,5 @@
 //! Sends changed bytes to everything that reads bytes from outside:
-//! `cargo run -p ovtigre-tests --bin torment -- [SECONDS [SEED]]`, 60 seconds for each reader and seed 1 where nothing is said.
+//! `cargo run -p ovtigre-tests --bin torment -- [SECONDS [SEED [READER…]]]`, 60 seconds for each reader and seed 1 where nothing is said.
 //! What a reader does not bear is written to `tests/fuzz/corpus`, where the tests and the fuzzers find it again.
 //! `torment begin` writes what the fuzzers begin with there.
 
@@ -43,7 +43,10 @@ fn main() -> anyhow::Result<()> {
     // Panics are told of with the bytes that brought them about; some decoders' are caught on purpose.
     std::panic::set_hook(Box::new(|_| ()));
     let mut found = 0;
-    for target in Target::ALL {
+    let named = |target: &Target| format!("{target:?}").to_lowercase();
+    let some: Vec<Target> =
+        Target::ALL.into_iter().filter(|target| std::env::args().any(|word| word == named(target))).collect();
+    for target in if some.is_empty() { Target::ALL.to_vec() } else { some } {
         let begun = Instant::now();
         let mut count = 0;
         let mut next = seed;
