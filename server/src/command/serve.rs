@@ -117,19 +117,7 @@ impl Serve {
         let own_token = secret::token()?;
         let rules = self.rules();
         let listens_to_all = !self.listen.ip().is_loopback();
-        let guarding = Guarding {
-            without_tokens: match (listens_to_all, self.insecure) {
-                (true, false) => WithoutTokens::Refuse,
-                _ => WithoutTokens::LetIn,
-            },
-            hosts: if listens_to_all {
-                Vec::new()
-            } else {
-                [vec!["localhost".to_owned()], self.hosts].concat()
-            },
-            requests_per_second: self.requests_per_second,
-            own_work: Some(hash(&own_token)),
-        };
+        let guarding = self.guarding(&own_token);
         let tls = self.tls_cert.zip(self.tls_key);
         let scheme = if tls.is_some() { "https" } else { "http" };
         let own_port = if tls.is_some() && self.workers > 0 { OwnPort::Yes } else { OwnPort::No };
@@ -179,6 +167,23 @@ impl Serve {
 }
 
 impl Serve {
+    fn guarding(&self, own_token: &str) -> Guarding {
+        let listens_to_all = !self.listen.ip().is_loopback();
+        Guarding {
+            without_tokens: match (listens_to_all, self.insecure) {
+                (true, false) => WithoutTokens::Refuse,
+                _ => WithoutTokens::LetIn,
+            },
+            hosts: if listens_to_all {
+                Vec::new()
+            } else {
+                [vec!["localhost".to_owned()], self.hosts.clone()].concat()
+            },
+            requests_per_second: self.requests_per_second,
+            own_work: Some(hash(own_token)),
+        }
+    }
+
     fn rules(&self) -> Rules {
         let disk = self.data.clone();
         Rules {
