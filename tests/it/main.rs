@@ -26,6 +26,7 @@ mod radiosity;
 mod same_bits;
 mod slope;
 mod stability;
+mod stripped;
 mod techniques;
 mod telemetry;
 mod tidy;
