@@ -3,7 +3,12 @@
 use crate::{
     api::{guard::Guarding, router},
     blobs::{BlobError, Blobs},
-    farm::{Farm, error::FarmError, rules::Rules},
+    farm::{
+        Farm,
+        check::{Checked, check},
+        error::FarmError,
+        rules::Rules,
+    },
     inspect::inspect,
     store::{Store, error::StoreError, sql::Sql},
     tls::{TlsListener, acceptor},
@@ -126,6 +131,29 @@ pub struct Serving {
     _lock: Option<File>,
 }
 
+/// Opens database and blobs.
+async fn open(config: &ServeConfig) -> Result<(Arc<dyn Store>, Blobs), ServeError> {
+    let store: Arc<dyn Store> = match &config.database {
+        Some(url) => Arc::new(Sql::server(url).await?),
+        None => Arc::new(Sql::file(&config.data.join("farm.sqlite")).await?),
+    };
+    let blobs = match &config.blobs {
+        Some(url) => Blobs::bucket(url)?,
+        None => Blobs::folder(&config.data.join("blobs"))?,
+    };
+    blobs.ping().await?;
+    Ok((store, blobs))
+}
+
+/// Looks whether what the database names is among the blobs. What other servers do meanwhile may be told as missing.
+pub async fn verify(config: ServeConfig) -> Result<Checked, ServeError> {
+    let _lock = if config.database.is_none() { Some(lock(&config.data)?) } else { None };
+    let (store, blobs) = open(&config).await?;
+    let checked = check(&*store, &blobs).await;
+    store.close().await;
+    Ok(checked?)
+}
+
 /// Opens database and blobs, takes up what was under way, and listens.
 pub async fn start(config: ServeConfig) -> Result<Serving, ServeError> {
     let acceptor = match &config.tls {
@@ -136,15 +164,7 @@ pub async fn start(config: ServeConfig) -> Result<Serving, ServeError> {
     let listening = |error| ServeError::Listen { address: config.listen, error };
     let listener = TcpListener::bind(config.listen).await.map_err(listening)?;
     let address = listener.local_addr().map_err(listening)?;
-    let store: Arc<dyn Store> = match &config.database {
-        Some(url) => Arc::new(Sql::server(url).await?),
-        None => Arc::new(Sql::file(&config.data.join("farm.sqlite")).await?),
-    };
-    let blobs = match &config.blobs {
-        Some(url) => Blobs::bucket(url)?,
-        None => Blobs::folder(&config.data.join("blobs"))?,
-    };
-    blobs.ping().await?;
+    let (store, blobs) = open(&config).await?;
     let farm = Farm::open(store, blobs, inspect(Limits::default()), config.rules, config.traces).await?;
     let closing = CancellationToken::new();
     let doors = router(Arc::clone(&farm), config.guarding);

@@ -2,14 +2,15 @@
 
 use crate::{
     glb::glb,
+    job_promises,
     matrix::{coated, lens, maps, moving, point, sky},
     mutation::{mutated, mutated_text},
     picture::{rendered, settings},
+    promises,
     proxy::Random,
     room::room,
     scenes::furnace,
 };
-use ovtigre::farm::{rules::Rules, submit::resolve};
 use ovtigre_core::{
     film::{
         append::Prefix,
@@ -22,19 +23,13 @@ use ovtigre_core::{
         size::Size,
         sum::Sum,
     },
-    gltf::limits::Limits,
-    path::expression::language::Language,
-    render::inspect::inspect,
     scene::environment::Environment,
 };
-use ovtigre_proto::{
-    job::{JobPatch, JobRequest},
-    lease::{Exchange, LeaseFailure, WorkerJoin},
-    scene::SceneContents,
-};
 use std::{
+    fs,
     io::{Cursor, Write as _},
     panic::catch_unwind,
+    path::{Path, PathBuf},
     time::{Duration, Instant},
 };
 
@@ -114,30 +109,41 @@ impl Target {
         }
     }
 
-    /// Reads it. That it is refused is as good as that it is taken; it must not panic.
+    /// Reads it. That it is refused is as good as that it is taken; it must not panic, and what is taken must be as promised.
     pub fn read(self, bytes: &[u8]) {
         match self {
-            Self::Glb | Self::Gltf | Self::Zip => drop(inspect(bytes, &limits())),
-            Self::Partial => drop(read_partial(bytes, 64)),
+            Self::Glb | Self::Gltf | Self::Zip => promises::scene(bytes),
+            Self::Partial => promises::partial(bytes),
             Self::Picture => drop(read_layers(bytes)),
             Self::Environment => drop(Environment::decode(bytes, 0.0)),
             Self::Prefix => drop(Prefix::from_bytes(bytes)),
-            Self::Json => read_json(bytes),
-            Self::Expression => drop(Language::compile(&[&String::from_utf8_lossy(bytes), "L(D|S)*E"])),
+            Self::Json => job_promises::document(bytes),
+            Self::Expression => promises::expression(bytes),
         }
     }
-}
 
-/// A farm's, but for what it would take to reach them.
-fn limits() -> Limits {
-    Limits {
-        buffer_bytes: 64 << 20,
-        document_bytes: 16 << 20,
-        triangles: 1_000_000,
-        instances: 100_000,
-        picture_pixels: 1 << 22,
-        morphed_vertices: 1 << 22,
-        ..Limits::default()
+    /// The fuzzer of `tests/fuzz` that reads the same, where there is one.
+    pub fn fuzzer(self) -> Option<&'static str> {
+        match self {
+            Self::Glb | Self::Gltf => Some("gltf"),
+            Self::Zip => Some("zip"),
+            Self::Partial => Some("partial"),
+            Self::Json => Some("job"),
+            Self::Expression => Some("expression"),
+            Self::Picture | Self::Environment | Self::Prefix => None,
+        }
+    }
+
+    /// The kept files that fuzzers begin with, and those that a reader stumbled over before.
+    pub fn kept(self) -> Vec<(PathBuf, Vec<u8>)> {
+        let Some(fuzzer) = self.fuzzer() else { return Vec::new() };
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus").join(fuzzer);
+        let files = fs::read_dir(folder).into_iter().flatten().map(|file| file.expect("a folder").path());
+        // What fuzzers add of themselves is named by its hash.
+        let kept = files.filter(|path| path.file_name().is_some_and(|name| name.len() < 40));
+        let mut kept: Vec<_> = kept.map(|path| (path.clone(), fs::read(path).expect("a file"))).collect();
+        kept.sort();
+        kept
     }
 }
 
@@ -168,25 +174,6 @@ const EXPRESSIONS: [&str; 8] = [
     "L.{0,12}E",
     "LS_T*DE",
 ];
-
-fn read_json(bytes: &[u8]) {
-    // As `Document` does of the bodies of requests.
-    if let Ok(request) = serde_json::from_slice::<JobRequest>(bytes) {
-        let scene = SceneContents {
-            cameras: vec!["front".to_owned()],
-            camera_aspect_ratios: vec![Some(2.0)],
-            ..SceneContents::default()
-        };
-        if let Ok(spec) = resolve(request, &scene, &Rules::default()) {
-            drop(serde_json::to_string(&spec));
-            drop(spec.schedule());
-        }
-    }
-    drop(serde_json::from_slice::<JobPatch>(bytes));
-    drop(serde_json::from_slice::<Exchange>(bytes));
-    drop(serde_json::from_slice::<LeaseFailure>(bytes));
-    drop(serde_json::from_slice::<WorkerJoin>(bytes));
-}
 
 /// The document and the rest of a binary glTF.
 fn parts(glb: &[u8]) -> (&[u8], &[u8]) {
@@ -276,7 +263,8 @@ pub fn bear(target: Target, bytes: &[u8]) -> Result<(), Stumbled> {
 /// Reads changed inputs until `goes_on` says no; how many.
 pub fn torment(target: Target, seed: u64, mut goes_on: impl FnMut(u64) -> bool) -> Result<u64, Stumbled> {
     let mut random = Random::new(seed);
-    let corpus = target.corpus();
+    let kept = target.kept().into_iter().map(|(_, bytes)| bytes);
+    let corpus: Vec<Vec<u8>> = target.corpus().into_iter().chain(kept).collect();
     corpus.iter().try_for_each(|good| bear(target, good))?;
     let mut count = 0;
     while goes_on(count) {

@@ -11,7 +11,7 @@ use clap::Args;
 use ovtigre::{
     api::guard::{Guarding, WithoutTokens, hash},
     farm::{rules::Rules, space::Room},
-    serve::{OwnPort, ServeConfig, free_bytes, start},
+    serve::{OwnPort, ServeConfig, free_bytes, start, verify},
     store::{Store as _, sql::Sql},
     webhook::Reach,
 };
@@ -21,6 +21,7 @@ use std::{
     net::{IpAddr, SocketAddr},
     num::NonZeroUsize,
     path::{Path, PathBuf},
+    time::Duration,
 };
 
 /// Run a farm.
@@ -62,6 +63,12 @@ pub(crate) struct Serve {
     /// GiB on the disk that are kept free: below, nothing new is taken and no batch is handed out.
     #[arg(long, value_name = "GIB", default_value_t = 1.0, value_parser = not_negative)]
     reserve: f64,
+    /// Days for which jobs that are over are kept, with their pictures [default: for ever].
+    #[arg(long, value_name = "DAYS", value_parser = not_negative)]
+    keep: Option<f64>,
+    /// Look whether what the database names is among the files, say what is lost, and leave.
+    #[arg(long)]
+    check: bool,
     /// Sums of a lane that are kept one by one before they are kept as one file.
     #[arg(long, value_name = "N", default_value_t = 8, hide = true, value_parser = clap::value_parser!(u32).range(1..))]
     partials_kept: u32,
@@ -103,22 +110,14 @@ impl Serve {
         let named = |flag: &Option<String>, name| flag.clone().or_else(|| std::env::var(name).ok());
         let database = named(&self.database, "OVTIGRE_DATABASE");
         let blobs = named(&self.blobs, "OVTIGRE_BLOBS");
+        if self.check {
+            let config = ServeConfig { database, blobs, ..ServeConfig::new(self.listen, self.data) };
+            return say_what_is_lost(config).await;
+        }
         let own_token = secret::token()?;
         let rules = self.rules();
         let listens_to_all = !self.listen.ip().is_loopback();
-        let guarding = Guarding {
-            without_tokens: match (listens_to_all, self.insecure) {
-                (true, false) => WithoutTokens::Refuse,
-                _ => WithoutTokens::LetIn,
-            },
-            hosts: if listens_to_all {
-                Vec::new()
-            } else {
-                [vec!["localhost".to_owned()], self.hosts].concat()
-            },
-            requests_per_second: self.requests_per_second,
-            own_work: Some(hash(&own_token)),
-        };
+        let guarding = self.guarding(&own_token);
         let tls = self.tls_cert.zip(self.tls_key);
         let scheme = if tls.is_some() { "https" } else { "http" };
         let own_port = if tls.is_some() && self.workers > 0 { OwnPort::Yes } else { OwnPort::No };
@@ -168,6 +167,23 @@ impl Serve {
 }
 
 impl Serve {
+    fn guarding(&self, own_token: &str) -> Guarding {
+        let listens_to_all = !self.listen.ip().is_loopback();
+        Guarding {
+            without_tokens: match (listens_to_all, self.insecure) {
+                (true, false) => WithoutTokens::Refuse,
+                _ => WithoutTokens::LetIn,
+            },
+            hosts: if listens_to_all {
+                Vec::new()
+            } else {
+                [vec!["localhost".to_owned()], self.hosts.clone()].concat()
+            },
+            requests_per_second: self.requests_per_second,
+            own_work: Some(hash(own_token)),
+        }
+    }
+
     fn rules(&self) -> Rules {
         let disk = self.data.clone();
         Rules {
@@ -175,12 +191,23 @@ impl Serve {
             reserve_bytes: (self.reserve * f64::from(1 << 30)) as u64,
             jobs_per_token: self.jobs_per_token,
             partials_kept: self.partials_kept,
+            kept: self.keep.and_then(|days| Duration::try_from_secs_f64(days * 86_400.0).ok()),
             notices_to: if self.private_webhooks { Reach::Anywhere } else { Reach::Public },
             // Where blobs are elsewhere the disk is not what fills.
             room: Room::new(move || free_bytes(&disk)),
             ..Rules::default()
         }
     }
+}
+
+/// Says what of a farm is lost and what is to be rendered again.
+async fn say_what_is_lost(config: ServeConfig) -> Outcome {
+    let checked = verify(config).await.map_err(|e| CommandError::wrong(e.to_string()))?;
+    checked.again.iter().for_each(|line| terminal::result(&format!("to be rendered again: {line}")));
+    checked.lost.iter().for_each(|line| terminal::result(&format!("lost: {line}")));
+    let (jobs, scenes, lost) = (checked.jobs, checked.scenes, checked.lost.len());
+    terminal::remark(&format!("{jobs} jobs and {scenes} scenes looked at"));
+    if lost > 0 { Err(CommandError::failed(format!("{lost} things are lost: see above"))) } else { Ok(()) }
 }
 
 /// An error where a farm that others can reach has no token that would let them in.

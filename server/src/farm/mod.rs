@@ -3,6 +3,7 @@
 pub mod append;
 pub mod audit;
 pub mod book;
+pub mod check;
 pub mod checkpoint;
 mod choice;
 pub mod commit;
@@ -14,6 +15,7 @@ pub mod error;
 pub mod extend;
 pub mod ids;
 pub mod join;
+mod keep;
 pub mod lease;
 pub mod live;
 pub mod mandates;

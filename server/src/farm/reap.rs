@@ -92,8 +92,9 @@ impl Farm {
         }
     }
 
-    /// Forgets idempotency keys, and uploads that were cut off.
-    async fn forget_old(&self) -> Result<()> {
+    /// Forgets idempotency keys, jobs that were kept long enough, and uploads that were cut off.
+    pub(super) async fn forget_old(&self) -> Result<()> {
+        self.let_go().await?;
         self.store.forget_keys(self.rules.keys).await?;
         self.blobs.delete_older(&BlobFolder::AllParts, UPLOAD_MAX).await?;
         Ok(self.blobs.delete_older(&BlobFolder::Incoming, UPLOAD_MAX).await?)

@@ -64,6 +64,8 @@ pub struct Rules {
     pub notice_rest: Duration,
     /// Idempotency keys are remembered so long.
     pub keys: Duration,
+    /// Jobs that are over are kept so long, and for ever where it is not said.
+    pub kept: Option<Duration>,
     /// Says how much room there is.
     pub room: Room,
     /// Bytes of it that are kept free.
@@ -102,6 +104,7 @@ impl Default for Rules {
             notices_to: Reach::Public,
             notice_rest: Duration::from_secs(5),
             keys: Duration::from_hours(24),
+            kept: None,
             room: Room::endless(),
             reserve_bytes: 1 << 30,
             scene_bytes: 2 << 30,

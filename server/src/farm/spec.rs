@@ -13,6 +13,7 @@ use ovtigre_core::{
 use ovtigre_proto::{id::BlobId, job::JobRequest, needs::Needs};
 use serde::{Deserialize, Deserializer, Serialize, de::Error as _};
 use serde_json::Value;
+use std::sync::LazyLock;
 
 /// A job with every default resolved.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -139,10 +140,11 @@ fn before() -> Settings {
 
 /// Settings as this version or an earlier one stored them.
 fn stored<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Settings, D::Error> {
+    static BEFORE: LazyLock<Value> = LazyLock::new(|| serde_json::to_value(before()).unwrap_or_default());
     let mut says = serde_json::Map::<String, Value>::deserialize(deserializer)?;
-    if let Ok(Value::Object(before)) = serde_json::to_value(before()) {
-        for (name, value) in before {
-            says.entry(name).or_insert(value);
+    for (name, value) in BEFORE.as_object().into_iter().flatten() {
+        if !says.contains_key(name) {
+            says.insert(name.clone(), value.clone());
         }
     }
     serde_json::from_value(Value::Object(says)).map_err(D::Error::custom)

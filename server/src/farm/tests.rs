@@ -4,6 +4,7 @@ pub(crate) mod bench;
 mod ending;
 mod extending;
 mod faults;
+mod housekeeping;
 mod layers;
 mod merging;
 mod replicas;

@@ -73,6 +73,8 @@ pub trait Store: Send + Sync + fmt::Debug {
     async fn change_job(&self, id: &JobId, version: u64, change: JobChange) -> Result<bool>;
     /// Forgets a job and all of it; false where there was none.
     async fn remove_job(&self, id: &JobId) -> Result<bool>;
+    /// The same of one that is settled and still has `version`; false where it is not so.
+    async fn remove_settled(&self, id: &JobId, version: u64) -> Result<bool>;
 
     /// What a job's work looks like.
     async fn ledger(&self, job: &JobId) -> Result<Ledger>;

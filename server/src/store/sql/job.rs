@@ -229,3 +229,12 @@ pub(super) async fn remove(db: &mut Db, id: &JobId) -> Result<bool> {
     forget(db, id, Kept::Nothing).await?;
     Ok(db.execute(query("DELETE FROM job WHERE id = $1").bind(id.as_str())).await? > 0)
 }
+
+/// Forgets a job that is settled and still has `version`.
+pub(super) async fn remove_settled(db: &mut Db, id: &JobId, version: u64) -> Result<bool> {
+    let there = query("SELECT id FROM job WHERE id = $1 AND version = $2 AND settled = 1");
+    match db.first(there.bind(id.as_str()).bind(version)).await? {
+        Some(_) => remove(db, id).await,
+        None => Ok(false),
+    }
+}

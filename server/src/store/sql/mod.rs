@@ -135,6 +135,13 @@ impl Store for Sql {
         self.writer.write(move |db| Box::pin(async move { job::remove(db, &id).await })).await
     }
 
+    async fn remove_settled(&self, id: &JobId, version: u64) -> Result<bool> {
+        let id = id.clone();
+        self.writer
+            .write(move |db| Box::pin(async move { job::remove_settled(db, &id, version).await }))
+            .await
+    }
+
     async fn ledger(&self, job: &JobId) -> Result<Ledger> {
         let (mut reader, job) = (self.reader().await?, job.clone());
         // A task of its own: a caller that goes away must not leave a reader behind that has begun.

@@ -62,9 +62,15 @@ impl Source {
             options = options.application_name("ovtigre");
         }
         let limits = [("idle_in_transaction_session_timeout", "5s"), ("lock_timeout", "20s")];
-        // Every statement that runs often has an index to go by, and what the planner knows of tables that fill
-        // and empty all the time is soon wrong.
-        let plans = [("enable_seqscan", "off"), ("jit", "off"), ("plan_cache_mode", "force_generic_plan")];
+        // Every statement that runs often has an index to go by, which has its order, too, and what the planner knows of
+        // tables that fill and empty all the time is soon wrong.
+        let plans = [
+            ("enable_seqscan", "off"),
+            ("enable_sort", "off"),
+            ("enable_incremental_sort", "off"),
+            ("jit", "off"),
+            ("plan_cache_mode", "force_generic_plan"),
+        ];
         Ok(Self::Server(Box::new(options.options(limits).options(plans))))
     }
 
