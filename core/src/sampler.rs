@@ -84,10 +84,10 @@ impl ScatteringNumbers {
         self.pair(1)
     }
 
-    /// Choice of light.
+    /// Choice of light; the second number where one has too few digits.
     #[inline]
-    pub fn light(&self) -> f32 {
-        self.first[2]
+    pub fn light(&self) -> Vec2 {
+        self.pair(2)
     }
 
     /// Place on the light.
@@ -274,7 +274,7 @@ mod tests {
                 let together = sampler.scattering(|what| at(n, what));
                 let [choice, direction, light, light_point] = DRAWN_TOGETHER.map(alone);
                 assert_eq!((together.choice(), together.direction()), (choice, direction));
-                assert_eq!((together.light(), together.light_point()), (light.x, light_point));
+                assert_eq!((together.light(), together.light_point()), (light, light_point));
             }
         }
     }

@@ -90,6 +90,11 @@ impl Method {
         matches!(self, Self::Photon | Self::Radiosity)
     }
 
+    /// Whether vertices of its paths look for light.
+    pub fn has_next_events(self) -> bool {
+        !matches!(self, Self::Light | Self::Photon)
+    }
+
     /// Whether a sample of one pixel can add light to any other, so that a batch is always the whole picture.
     pub fn splats(self) -> bool {
         matches!(self, Self::Light | Self::Bidirectional | Self::Photon)

@@ -121,7 +121,7 @@ pub struct JobStatus {
     /// Paths that are asked for and that no technique of the method makes.
     #[serde(default)]
     pub unreachable: Vec<Unreachable>,
-    /// Where the method is `radiosity` and a sum has come: how the scene was solved, with the residual of every iteration.
+    /// Where the method is `radiosity` and a sum has come: how the scene was solved, with the residual of every iteration. Not in lists.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub radiosity: Option<RadiosityReport>,
     /// What it needs of the scene and the program, and what it leaves out.

@@ -15,6 +15,7 @@ mod faults;
 mod gltf;
 mod hostile;
 mod lens;
+mod many_lights;
 mod methods;
 mod motion;
 mod mutate;

@@ -8,6 +8,7 @@ pub mod corpus;
 pub mod glb;
 pub mod hostile;
 pub mod irradiance;
+pub mod lamps;
 pub mod matrix;
 pub mod mutate;
 pub mod mutation;

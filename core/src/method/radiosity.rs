@@ -88,7 +88,7 @@ fn gather(
 ) -> Rgb {
     let numbers = Numbers {
         direction: sampler.pair(Dimension::Eye(0, Use::Direction)),
-        light: sampler.pair(Dimension::Eye(0, Use::Light)).x,
+        light: sampler.pair(Dimension::Eye(0, Use::Light)),
         place: sampler.pair(Dimension::Eye(0, Use::LightPoint)),
         key: sampler.key(Dimension::Eye(1, Use::Alpha)),
     };

@@ -18,6 +18,7 @@ use crate::sampler::Sampler;
 use crate::scene::Scene;
 use crate::scene::importance::Importance;
 use crate::scene::interaction::Interaction;
+use crate::scene::lit::Lit;
 use crate::trace::ray::Ray;
 use glam::Vec3;
 
@@ -76,7 +77,7 @@ pub fn from_eye<'a, C: Carriage>(
     let carried = C::Eye::in_state(rules.language.eye_start(), Vec3::ONE);
     let cos = cosine(view.axis(), ray.direction);
     let density = Density::SolidAngle(pdf as f32);
-    let edge = Edge { ray, from: ray.origin, cos, density, kind };
+    let edge = Edge { ray, from: Lit::in_space(ray.origin), cos, density, kind };
     let partial = Partial { near, far: 0.0 };
     let mut walk = Walk::new((scene, rules, sampler), Transport::Radiance, edge, carried, partial);
     walk.media = rules.media_of_eye(scene, &ray);

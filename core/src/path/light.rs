@@ -19,6 +19,7 @@ use crate::sampler::{Dimension, Sampler, StartUse};
 use crate::scene::Scene;
 use crate::scene::emission::{Emission, Origin, Place};
 use crate::scene::interaction::Interaction;
+use crate::scene::lit::Lit;
 use crate::trace::moment::Moment;
 use crate::trace::ray::Ray;
 use glam::{Vec2, Vec3};
@@ -81,15 +82,23 @@ impl<'a, C: Carriage> Visitor<'a, LightState, C::Light> for FromLight<'a, C> {
 }
 
 impl<'a, C: Carriage> FromLight<'a, C> {
-    /// At the second vertex: how next events there would have found the first. The place on a surface is sampled
-    /// differently by the two, so that 1 / p→ of the first edge alone is not yet what is behind.
+    /// At the second vertex: how next events there would have found the first. Lights, and places on their surfaces, are
+    /// sampled differently by the two, so that 1 / p→ of the first edge alone is not yet what is behind.
     fn learn(&mut self, walk: &mut Walk<'a, LightState, C::Light>, at: &Interaction<'a>) {
-        let Place::Surface(from) = &self.origin.place else { return };
-        let data = &walk.scene.data;
+        let (scene, light) = (walk.scene, self.origin.light);
+        if !matches!(self.origin.place, Place::Surface(_)) && !scene.lights.are_by_tree() {
+            return;
+        }
         let towards = -walk.edge.ray.direction;
-        let pdf = walk.scene.lights.light_pdf(data, self.origin.light, at.position, from, towards);
-        let squared = walk.squared(at.position);
-        self.start.next_event = f64::from(pdf) * walk.edge.cos / squared;
+        let lit = at.lit(at.side(towards));
+        self.start.next_event = match (&self.origin.place, &scene.environment) {
+            (Place::Surface(from), _) => {
+                let pdf = scene.lights.light_pdf(&scene.data, light, &lit, from, towards);
+                f64::from(pdf) * walk.edge.cos / walk.squared(at.position)
+            }
+            (Place::Sky(..), Some(sky)) => f64::from(scene.lights.environment_pdf(sky, &lit, towards)),
+            _ => f64::from(scene.lights.probability_at(&lit, light)),
+        };
         let h = walk.rules.heuristic();
         walk.partial.near *= h.of(self.start.next_event / f64::from(self.origin.pdf));
     }
@@ -148,7 +157,7 @@ pub(in crate::path) fn set_out<'a, C: Carriage>(
         _ => emission.ray.origin,
     };
     let density = Density::SolidAngle(emission.pdf);
-    let edge = Edge { ray: emission.ray.at(moment), from, cos, density, kind };
+    let edge = Edge { ray: emission.ray.at(moment), from: Lit::in_space(from), cos, density, kind };
     let partial = Partial { near, far };
     let mut walk = Walk::new((scene, rules, sampler), Transport::Importance, edge, carried, partial);
     if walk.keeps_links() {

@@ -5,7 +5,8 @@ use crate::bsdf::event::{Letter, SampleKind, Scattered, Transport};
 use crate::math::colour::Rgb;
 use crate::math::cosine::cosine;
 use crate::path::rules::Rules;
-use crate::scene::interaction::Interaction;
+use crate::scene::interaction::{Interaction, Side};
+use crate::scene::lit::Lit;
 use crate::trace::ray::Ray;
 use glam::{Vec2, Vec3};
 use std::borrow::Cow;
@@ -108,6 +109,12 @@ impl<'s> Vertex<'s> {
     /// Unit direction back along the path.
     pub fn back(&self) -> Vec3 {
         self.at.shading.to_world(self.wo)
+    }
+
+    /// Where light is looked for that it scatters back along the path.
+    #[inline]
+    pub fn lit(&self) -> Lit {
+        self.at.lit(if self.cos_back < 0.0 { Side::Back } else { Side::Front })
     }
 
     /// Whether a next event can contribute.

@@ -14,6 +14,7 @@ use crate::path::vertex::{Continuation, Crossing, Density, Vertex};
 use crate::sampler::{Dimension, Sampler, ScatteringNumbers, Use};
 use crate::scene::Scene;
 use crate::scene::interaction::Interaction;
+use crate::scene::lit::Lit;
 use crate::scene::view::View;
 use crate::trace::ray::Ray;
 use core::marker::PhantomData;
@@ -84,7 +85,7 @@ pub struct Edge {
     /// The ray.
     pub ray: Ray,
     /// The point that its direction was chosen at.
-    pub from: Vec3,
+    pub from: Lit,
     /// |cos θ| there; one at points and for light from infinitely far.
     pub cos: f64,
     /// How it was chosen.
@@ -228,7 +229,7 @@ impl<'a, S: State, T: Throughput<S>> Walk<'a, S, T> {
     /// Squared length of the edge up to `position`, or one where its density is over places.
     pub fn squared(&self, position: Vec3) -> f64 {
         match self.edge.kind {
-            EdgeKind::Directions => squared_distance(position, self.edge.from),
+            EdgeKind::Directions => squared_distance(position, self.edge.from.point),
             EdgeKind::Parallel => 1.0,
         }
     }
@@ -282,7 +283,7 @@ impl<'a, S: State, T: Throughput<S>> Walk<'a, S, T> {
             self.media.cross(&vertex.at, direction);
         }
         let ray = vertex.ray(direction);
-        self.edge = Edge { ray, from: vertex.at.position, cos, density, kind: EdgeKind::Directions };
+        self.edge = Edge { ray, from: vertex.lit(), cos, density, kind: EdgeKind::Directions };
     }
 
     fn survives(&mut self, u: f32) -> bool {

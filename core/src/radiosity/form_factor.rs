@@ -78,7 +78,7 @@ fn row(surroundings: &Surroundings<'_>, element: Element, count: u32) -> Row {
         covered += f64::from(alpha);
         let numbers = Numbers {
             direction: pair(Use::Direction),
-            light: pair(Use::Light).x,
+            light: pair(Use::Light),
             place: pair(Use::LightPoint),
             key: sampler.key(Dimension::Eye(0, Use::Alpha)),
         };

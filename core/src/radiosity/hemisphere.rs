@@ -42,7 +42,7 @@ pub struct Numbers {
     /// For the direction.
     pub direction: Vec2,
     /// For the choice of light.
-    pub light: f32,
+    pub light: Vec2,
     /// For the place on it.
     pub place: Vec2,
     /// For what is partly transparent.
@@ -99,12 +99,12 @@ impl Surroundings<'_> {
             let stays = wi.z * sign > 0.0 && direction.dot(at.ng) * sign > 0.0;
             if stays { (value(wi), wi.z.abs() * FRAC_1_PI) } else { (Rgb::ZERO, 0.0) }
         };
-        let mut look = Look { direct: self.next_event(at, &value, numbers, rays), onward: None };
+        let mut look = Look { direct: self.next_event(at, side, &value, numbers, rays), onward: None };
         let wi = warp::cosine_hemisphere(numbers.direction);
         let direction = at.shading.to_world(wi.with_z(wi.z * sign)).normalize_or_zero();
         let (f, pdf) = value(direction);
         if f != Rgb::ZERO && pdf > 0.0 {
-            let (radiance, onward) = self.follow(at, direction, pdf, numbers.key, rays);
+            let (radiance, onward) = self.follow(at, side, direction, pdf, numbers.key, rays);
             look.direct += f / pdf * radiance;
             look.onward = onward.map(|(element, local)| Onward { element, local, weight: f / pdf });
         }
@@ -115,6 +115,7 @@ impl Surroundings<'_> {
     fn next_event(
         &self,
         at: &Interaction<'_>,
+        side: Side,
         value: &impl Fn(Vec3) -> (Rgb, f32),
         numbers: Numbers,
         rays: &mut u64,
@@ -128,7 +129,7 @@ impl Surroundings<'_> {
             &scene.data,
             environment,
             Moment::STILL,
-            at.position,
+            &at.lit(side),
             numbers.light,
             numbers.place,
         );
@@ -163,6 +164,7 @@ impl Surroundings<'_> {
     fn follow(
         &self,
         at: &Interaction<'_>,
+        side: Side,
         direction: Vec3,
         pdf: f32,
         key: u64,
@@ -177,7 +179,7 @@ impl Surroundings<'_> {
         let origin = at.leave(direction);
         let Some(hit) = scene.closest(&Ray::new(origin, direction), || key) else {
             let Some(environment) = &scene.environment else { return (Rgb::ZERO, None) };
-            let light_pdf = scene.lights.environment_pdf(environment, direction);
+            let light_pdf = scene.lights.environment_pdf(environment, &at.lit(side), direction);
             return (environment.radiance(direction) * weight(light_pdf), None);
         };
         let there = scene.data.interaction(hit.instance, hit.triangle, hit.barycentric, Moment::STILL);
@@ -188,7 +190,7 @@ impl Surroundings<'_> {
             let light_pdf = match self.sources {
                 Sources::Met => 0.0,
                 Sources::Sampled => {
-                    scene.lights.triangle_pdf(&scene.data, triangle, at.position, &there, direction)
+                    scene.lights.triangle_pdf(&scene.data, triangle, &at.lit(side), &there, direction)
                 }
             };
             radiance = there.emission(side) * weight(light_pdf);

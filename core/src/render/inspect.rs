@@ -15,6 +15,7 @@ use crate::scene::camera::{Camera, Projection};
 use crate::scene::data::SceneData;
 use crate::scene::environment::Environment;
 use crate::scene::material::{Coverage, Material, RoughnessMap};
+use crate::scene::nearby::is_worth_a_tree;
 use crate::scene::punctual::PunctualKind;
 use crate::settings::Method;
 use std::sync::Arc;
@@ -23,6 +24,9 @@ use std::sync::Arc;
 pub const DEFAULT_SKY: &str = "default sky";
 /// What a scene with light from infinitely far of its own needs.
 pub const IMAGE_BASED: &str = "image-based light";
+
+/// What a scene of many lights needs.
+pub const LIGHT_TREE: &str = "light tree";
 
 /// What is in a scene.
 #[derive(Clone, Debug)]
@@ -152,7 +156,7 @@ fn letters(material: &Material) -> Letters {
 }
 
 /// Each feature that a scene may need, and whether this one does.
-fn features(report: &Report, data: &SceneData) -> [(&'static str, bool); 18] {
+fn features(report: &Report, data: &SceneData) -> [(&'static str, bool); 19] {
     let any = |of: fn(&Material) -> bool| data.materials.iter().any(of);
     [
         ("triangles", data.meshes.iter().any(|m| !m.triangles.is_empty())),
@@ -168,6 +172,7 @@ fn features(report: &Report, data: &SceneData) -> [(&'static str, bool); 18] {
         ("emissive surfaces", any(Material::emits)),
         ("unlit surfaces", any(|m| m.unlit.is_some())),
         ("punctual lights", !data.punctual.is_empty()),
+        (LIGHT_TREE, is_worth_a_tree(data)),
         (IMAGE_BASED, data.environment.is_some()),
         (DEFAULT_SKY, !data.is_lit()),
         ("animation", report.animated.nodes > 0),

@@ -11,6 +11,7 @@ use crate::scene::Scene;
 use crate::scene::camera::Camera;
 use crate::scene::data::SceneData;
 use crate::scene::environment::{Environment, EnvironmentError};
+use crate::scene::nearby::is_worth_a_tree;
 use crate::scene::view::{LensInScene, Views};
 use crate::settings::{CameraChoice, EnvironmentSource, Method, Settings};
 use crate::trace::build_error::BuildError;
@@ -78,7 +79,7 @@ pub fn prepare(
     Ok(Prepared { scene, radiosity })
 }
 
-/// Reads a scene, builds its trees and gathers its lights. `environment` holds the bytes of the image that the
+/// Reads a scene, builds its trees and gathers its lights, in a tree where next events to many of them are made. `environment` holds the bytes of the image that the
 /// settings name, if they do; the scene's own counts where they name none. A scene that nothing lights gets a default sky.
 pub fn open(
     bytes: impl Into<Arc<[u8]>>,
@@ -103,7 +104,11 @@ pub fn open(
     let is_lit = data.is_lit();
     let own = data.environment.take().map(Arc::unwrap_or_clone);
     let environment = given.or(own).or_else(|| (!is_lit).then(Environment::default_sky));
-    Ok(Scene::new(data, environment, views)?)
+    let mut scene = Scene::new(data, environment, views)?;
+    if settings.method.has_next_events() && is_worth_a_tree(&scene.data) {
+        scene.lights = scene.lights.by_tree(&scene.data);
+    }
+    Ok(scene)
 }
 
 fn views(data: &SceneData, settings: &Settings) -> Result<Views, PrepareError> {

@@ -5,6 +5,7 @@ use crate::math::colour::Rgb;
 use crate::math::frame::Frame;
 use crate::scene::data::SceneData;
 use crate::scene::instance::{Handedness, Motion, Placement};
+use crate::scene::lit::{Lit, LitFrom};
 use crate::scene::material::{LayerMaterial, Material, MaterialId, Sides, SurfaceCoordinates};
 use crate::scene::mesh::Mesh;
 use crate::scene::texture::Texture;
@@ -285,6 +286,13 @@ impl Interaction<'_> {
     #[inline]
     pub fn side(&self, direction: Vec3) -> Side {
         if direction.dot(self.ng) < 0.0 { Side::Back } else { Side::Front }
+    }
+
+    /// Where light is looked for to scatter, on a side.
+    pub fn lit(&self, side: Side) -> Lit {
+        let normal = if side == Side::Back { -self.ng } else { self.ng };
+        let from = if self.material.transmits() { LitFrom::BothSides } else { LitFrom::Above };
+        Lit { point: self.position, normal, from }
     }
 
     /// Radiance emitted on a side, W/(sr·m²).

@@ -7,7 +7,9 @@ use crate::scene::emitter::{Emitter, area};
 use crate::scene::environment::Environment;
 use crate::scene::interaction::Interaction;
 use crate::scene::light::{Light, NextEvent};
+use crate::scene::lit::Lit;
 use crate::scene::material::{Material, Sides};
+use crate::scene::nearby::Nearby;
 use crate::scene::punctual::PunctualKind;
 use crate::scene::texture::Texture;
 use crate::trace::moment::Moment;
@@ -19,17 +21,21 @@ use std::collections::BTreeMap;
 /// No light has this number.
 const NONE: u32 = u32::MAX;
 
-/// All lights of a scene, chosen in proportion to their power.
+/// All lights of a scene. Light starts from them in proportion to their power; next events choose them likewise, or by a tree.
 #[derive(Clone, Debug, Default)]
 pub struct Lights {
     /// Triangles first.
     all: Vec<Light>,
+    /// Of each of them.
+    powers: Vec<f64>,
     /// The triangles among them; `None` of those that move.
     emitters: Vec<Option<Emitter>>,
     choice: AliasTable,
     /// For each instance, the light of each triangle; empty where none emits.
     by_triangle: Vec<Vec<u32>>,
     environment: Option<u32>,
+    /// Where next events choose by a tree.
+    nearby: Option<Nearby>,
 }
 
 impl Lights {
@@ -87,7 +93,35 @@ impl Lights {
             }
         }
         let choice = AliasTable::new(&powers).unwrap_or_default();
-        Self { all: lights, emitters, choice, by_triangle, environment: from_environment }
+        Self {
+            all: lights,
+            powers,
+            emitters,
+            choice,
+            by_triangle,
+            environment: from_environment,
+            nearby: None,
+        }
+    }
+
+    /// The same lights, chosen by a tree for next events.
+    #[must_use]
+    pub fn by_tree(mut self, data: &SceneData) -> Self {
+        self.nearby = Nearby::new(data, &self.all, &self.powers);
+        self
+    }
+
+    /// The same lights, chosen in proportion to their power for next events.
+    #[must_use]
+    pub fn by_power(mut self) -> Self {
+        self.nearby = None;
+        self
+    }
+
+    /// Whether next events choose by a tree.
+    #[inline]
+    pub fn are_by_tree(&self) -> bool {
+        self.nearby.is_some()
     }
 
     /// Number of lights.
@@ -125,24 +159,36 @@ impl Lights {
         self.environment
     }
 
-    /// Probability with which a light is chosen.
+    /// Probability with which light starts from a light of a number.
     pub fn probability(&self, number: u32) -> f32 {
         self.choice.probability(number as usize)
     }
 
-    /// A light's number and a next event from `point` to it at a moment; its density includes the choice of the light.
+    /// Probability with which a next event at a point chooses a light of a number.
+    #[inline]
+    pub fn probability_at(&self, lit: &Lit, number: u32) -> f32 {
+        match &self.nearby {
+            Some(nearby) => nearby.probability(lit, number),
+            None => self.probability(number),
+        }
+    }
+
+    /// A light's number and a next event from a point to it at a moment; its density includes the choice of the light.
     pub fn sample(
         &self,
         data: &SceneData,
         environment: Option<&Environment>,
         moment: Moment,
-        point: Vec3,
-        choice: f32,
+        lit: &Lit,
+        choice: Vec2,
         place: Vec2,
     ) -> Option<(u32, NextEvent)> {
-        let (light, probability) = self.choose(choice)?;
+        let (light, probability) = match &self.nearby {
+            Some(nearby) => nearby.choose(lit, choice),
+            None => self.choose(choice.x)?,
+        };
         let emitter = || self.emitter(data, light, moment);
-        let event = self.light(light).sample(data, environment, emitter, (moment, point), place)?;
+        let event = self.light(light).sample(data, environment, emitter, (moment, lit.point), place)?;
         Some((light, NextEvent { pdf: event.pdf * probability, ..event }))
     }
 
@@ -159,45 +205,46 @@ impl Lights {
         }
     }
 
-    /// Density over solid angle at `point` of next events towards `at`, seen in `direction` on a triangle; zero
+    /// Density over solid angle at a point of next events towards `at`, seen in `direction` on a triangle; zero
     /// where that triangle is no light.
     pub fn triangle_pdf(
         &self,
         data: &SceneData,
         (instance, triangle): (u32, u32),
-        point: Vec3,
+        lit: &Lit,
         at: &Interaction<'_>,
         direction: Vec3,
     ) -> f32 {
         match self.of_triangle((instance, triangle)) {
             Some(light) => {
-                self.emitter(data, light, at.moment).pdf(point, at, direction) * self.probability(light)
+                let pdf = self.emitter(data, light, at.moment).pdf(lit.point, at, direction);
+                pdf * self.probability_at(lit, light)
             }
             None => 0.0,
         }
     }
 
-    /// Density over solid angle at `point` of next events towards `at`, a point of the light of a number, seen in
+    /// Density over solid angle at a point of next events towards `at`, a point of the light of a number, seen in
     /// `direction`; zero for a light without extent.
     pub fn light_pdf(
         &self,
         data: &SceneData,
         light: u32,
-        point: Vec3,
+        lit: &Lit,
         at: &Interaction<'_>,
         direction: Vec3,
     ) -> f32 {
         match *self.light(light) {
             Light::Triangle { instance, triangle } => {
-                self.triangle_pdf(data, (instance, triangle), point, at, direction)
+                self.triangle_pdf(data, (instance, triangle), lit, at, direction)
             }
             _ => 0.0,
         }
     }
 
-    /// Density over solid angle of next events in `direction` towards the environment.
-    pub fn environment_pdf(&self, environment: &Environment, direction: Vec3) -> f32 {
-        self.environment.map_or(0.0, |light| environment.pdf(direction) * self.probability(light))
+    /// Density over solid angle of next events at a point in `direction` towards the environment.
+    pub fn environment_pdf(&self, environment: &Environment, lit: &Lit, direction: Vec3) -> f32 {
+        self.environment.map_or(0.0, |light| environment.pdf(direction) * self.probability_at(lit, light))
     }
 }
 

@@ -281,6 +281,11 @@ impl Material {
         if self.volume.is_some() { Walls::Solid } else { Walls::Thin }
     }
 
+    /// Whether any of it scatters light to its other side.
+    pub fn transmits(&self) -> bool {
+        self.transmission.factor > 0.0 || self.layers.as_ref().is_some_and(|l| l.through.factor > 0.0)
+    }
+
     /// Whether it emits anywhere.
     pub fn emits(&self) -> bool {
         self.emission.factor.max_element() > 0.0

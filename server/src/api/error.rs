@@ -44,6 +44,17 @@ impl ApiError {
             .at(vec![fault(format!("?{name}"), detail)])
     }
 
+    /// A cursor that is none, or not one of the order that it is sent with.
+    pub fn cursor(text: &str) -> Self {
+        let text: String = text.chars().take(80).collect();
+        let detail = format!("'{text}' is no page's 'next' in this order");
+        if !text.starts_with(|c: char| c.is_ascii_digit()) {
+            return Self::parameter("cursor", detail);
+        }
+        Self::new(StatusCode::UNPROCESSABLE_ENTITY, "invalid-cursor", "Invalid cursor", detail.clone())
+            .at(vec![fault("?cursor".to_owned(), detail)])
+    }
+
     /// A header that cannot be understood.
     pub fn header(detail: impl Into<String>) -> Self {
         Self::new(StatusCode::BAD_REQUEST, "invalid-header", "Invalid header", detail)

@@ -4,12 +4,12 @@ use super::{
     body::Document,
     error::{ApiError, Result},
     guard::Caller,
-    params::{Named, Params, cursor, id, limit},
+    params::{Named, Params, id, limit},
     tag,
 };
 use crate::{
     farm::{Farm, error::FarmError, spec::JobSpec},
-    store::row::JobFilter,
+    store::list::{JobFilter, Key, Order, Place, Way},
 };
 use axum::{
     Extension, Json,
@@ -93,6 +93,44 @@ pub async fn create(
     Ok((StatusCode::ACCEPTED, location, with_tag(status)).into_response())
 }
 
+/// An order of jobs, downward after a minus.
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema)]
+enum Sort {
+    #[serde(rename = "created")]
+    Created,
+    #[default]
+    #[serde(rename = "-created")]
+    CreatedDown,
+    #[serde(rename = "name")]
+    Name,
+    #[serde(rename = "-name")]
+    NameDown,
+    #[serde(rename = "state")]
+    State,
+    #[serde(rename = "-state")]
+    StateDown,
+    #[serde(rename = "priority")]
+    Priority,
+    #[serde(rename = "-priority")]
+    PriorityDown,
+}
+
+impl From<Sort> for Order {
+    fn from(sort: Sort) -> Self {
+        let (by, way) = match sort {
+            Sort::Created => (Key::Created, Way::Up),
+            Sort::CreatedDown => (Key::Created, Way::Down),
+            Sort::Name => (Key::Name, Way::Up),
+            Sort::NameDown => (Key::Name, Way::Down),
+            Sort::State => (Key::State, Way::Up),
+            Sort::StateDown => (Key::State, Way::Down),
+            Sort::Priority => (Key::Priority, Way::Up),
+            Sort::PriorityDown => (Key::Priority, Way::Down),
+        };
+        Self { by, way }
+    }
+}
+
 /// Which jobs are listed.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -102,27 +140,32 @@ pub struct ListParams {
     /// Only those whose name or id has this in it.
     #[schemars(length(max = 200))]
     text: Option<String>,
+    /// What they go by, `-created` where it is not said: the newest first. Names go by their letters, A to Z like a to z, states
+    /// by their names; a minus turns the order round. Jobs that are alike go by when they came, the same way.
+    sort: Option<Sort>,
     /// Items at most.
     #[schemars(range(min = 1, max = 500))]
     limit: Option<u32>,
-    /// `next` of the page before.
-    #[schemars(regex(pattern = r"^[0-9]{1,18}$"))]
+    /// `next` of the page before, in the same order.
+    #[schemars(regex(pattern = r"^[0-9]{1,18}(\.([0-9a-f]{2}){0,200})?$"))]
     cursor: Option<String>,
 }
 
-/// Jobs, the newest first. The tag is that of the answer's bytes, for those who ask again and again.
+/// A page of jobs. The tag is that of the answer's bytes, for those who ask again and again.
 pub async fn list(
     State(farm): State<Arc<Farm>>,
     Params(params): Params<ListParams>,
     headers: HeaderMap,
 ) -> Result<Response> {
-    let ListParams { state, text, .. } = params;
+    let ListParams { state, text, sort, cursor, .. } = params;
     if text.as_ref().is_some_and(|text| text.len() > TEXT_MAX) {
         return Err(ApiError::parameter("text", format!("the text has more than {TEXT_MAX} bytes")));
     }
     let text = text.filter(|text| !text.is_empty());
-    let before = cursor(params.cursor.as_deref())?;
-    let page = farm.jobs(JobFilter { state, text, before, limit: limit(params.limit)? }).await?;
+    let order = Order::from(sort.unwrap_or_default());
+    let place = |text: String| Place::parse(&text, order.by).ok_or_else(|| ApiError::cursor(&text));
+    let after = cursor.map(place).transpose()?;
+    let page = farm.jobs(JobFilter { state, text, order, after, limit: limit(params.limit)? }).await?;
     let body = serde_json::to_vec(&page).map_err(|e| FarmError::Damaged(e.to_string()))?;
     let name = blake3::hash(&body).to_hex();
     let head = [(header::ETAG, tag::strong(&name)), (header::CACHE_CONTROL, NO_CACHE)];

@@ -84,7 +84,7 @@ fn of_scenes_and_jobs(method: &Method, path: &str) -> Option<Operation> {
         ("GET", "/v1/scenes/{id}") => ("getScene", "What is in an uploaded file"),
         ("GET", "/v1/scenes/{id}/bytes") => ("getSceneBytes", "The bytes of an uploaded file"),
         ("POST", "/v1/jobs") => ("createJob", "Takes a job, or only checks it"),
-        ("GET", "/v1/jobs") => ("listJobs", "Jobs, the newest first"),
+        ("GET", "/v1/jobs") => ("listJobs", "Jobs, page by page"),
         ("GET", "/v1/jobs/{id}") => ("getJob", "How a job stands; the ETag is that of what can be changed"),
         ("PATCH", "/v1/jobs/{id}") => {
             ("patchJob", "Changes priority or state, or asks for more samples or a smaller error")

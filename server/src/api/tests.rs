@@ -19,7 +19,7 @@ use futures::StreamExt as _;
 use ovtigre_core::film::exr::read_layers;
 use ovtigre_proto::{
     id::JobId,
-    job::JobRequest,
+    job::{JobPatch, JobRequest},
     lease::{Committed, ExchangeReply, WorkerJoined},
     pixel::Pixel,
     problem::Problem,
@@ -182,6 +182,9 @@ async fn every_error_is_a_problem_document() {
     doors.get("/v1/jobs?limit=0").await.problem(400, "invalid-parameter");
     doors.get("/v1/jobs?limit=many").await.problem(400, "invalid-parameter");
     doors.get("/v1/jobs?cursor=x").await.problem(400, "invalid-parameter");
+    doors.get("/v1/jobs?sort=colour").await.problem(400, "invalid-parameter");
+    doors.get("/v1/jobs?sort=name&cursor=17").await.problem(422, "invalid-cursor");
+    doors.get("/v1/jobs?sort=-priority&cursor=17.7a").await.problem(422, "invalid-cursor");
     doors.get("/v1/jobs?colour=red").await.problem(400, "invalid-parameter");
     doors.send(Method::POST, "/v1/jobs", &[], "{}").await.problem(415, "unsupported-media-type");
     let multipart = [("content-type", "multipart/form-data; boundary=x")];
@@ -699,6 +702,30 @@ async fn a_list_that_is_as_before_is_not_sent_again() {
         assert_eq!(list(&query, "").await.json()["items"].as_array().unwrap().len(), found, "{query}");
     }
     list(&format!("?text={}", "x".repeat(201)), "").await.problem(400, "invalid-parameter");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn jobs_are_listed_page_by_page_in_the_order_asked_for() {
+    let doors = Doors::open().await;
+    let mut expected = Vec::new();
+    for priority in [1, 3, 3] {
+        let job = doors.job(4).await;
+        let patch = JobPatch { priority: Some(priority), ..JobPatch::default() };
+        doors.bench.farm.patch(&job, &patch, None).await.unwrap();
+        expected.insert(0, job.to_string());
+    }
+    for (sort, order) in [("", [0, 1, 2]), ("&sort=created", [2, 1, 0]), ("&sort=priority", [2, 1, 0])] {
+        let (mut found, mut query) = (Vec::new(), format!("?limit=2{sort}"));
+        while let Some(next) = {
+            let page = doors.get(&format!("/v1/jobs{query}")).await.json();
+            let items = page["items"].as_array().unwrap();
+            found.extend(items.iter().map(|job| job["id"].as_str().unwrap().to_owned()));
+            page["next"].as_str().map(ToOwned::to_owned)
+        } {
+            query = format!("?limit=2{sort}&cursor={next}");
+        }
+        assert_eq!(found, order.map(|i| expected[i].clone()), "{sort}");
+    }
 }
 
 #[tokio::test(flavor = "multi_thread")]

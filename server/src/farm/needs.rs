@@ -3,7 +3,7 @@
 use super::reach::{is_sky, letters};
 use ovtigre_core::{
     bsdf::event::{Letter, Letters},
-    render::inspect::DEFAULT_SKY,
+    render::inspect::{DEFAULT_SKY, LIGHT_TREE},
     settings::{Method, Settings},
 };
 use ovtigre_proto::{
@@ -20,11 +20,18 @@ pub fn needs(scene: &SceneContents, settings: &Settings, words: Letters) -> Need
     for what in &scene.needs {
         match &settings.environment {
             Some(_) if is_sky(what) => leave(&mut list, what, "an environment is given"),
+            _ if what == LIGHT_TREE && !settings.method.has_next_events() => {
+                leave(&mut list, what, &format!("method {} has no next events", settings.method.name()));
+            }
             _ => need(&mut list, what),
         }
     }
     for what in &scene.leaves_out {
-        let why = if what == DEFAULT_SKY { "the scene has light" } else { "the scene has none" };
+        let why = match what.as_str() {
+            DEFAULT_SKY => "the scene has light",
+            LIGHT_TREE => "the scene has few lights",
+            _ => "the scene has none",
+        };
         leave(&mut list, what, why);
     }
     let open = settings.shutter.close > settings.shutter.open;
@@ -79,7 +86,7 @@ mod tests {
     fn scene() -> SceneContents {
         SceneContents {
             letters: vec!["D".to_owned(), "S".to_owned()],
-            needs: ["triangles", "animation", DEFAULT_SKY].map(str::to_owned).into(),
+            needs: ["triangles", "animation", LIGHT_TREE, DEFAULT_SKY].map(str::to_owned).into(),
             leaves_out: vec!["textures".to_owned()],
             ..SceneContents::default()
         }
@@ -94,7 +101,8 @@ mod tests {
     #[test]
     fn everything_is_needed_or_left_out_with_a_reason() {
         let plain = of(|_| ());
-        assert_eq!(plain.needed, ["triangles", "animation", DEFAULT_SKY, "scattering D", "scattering S"]);
+        let needed = ["triangles", "animation", LIGHT_TREE, DEFAULT_SKY, "scattering D", "scattering S"];
+        assert_eq!(plain.needed, needed);
         for (what, why) in [
             ("textures", "the scene has none"),
             ("motion blur", "the shutter is open for no time"),
@@ -119,5 +127,8 @@ mod tests {
         for what in ["scattering S", DEFAULT_SKY, "photon maps"] {
             assert!(other.left_out.iter().any(|left| left.what == what), "{what}: {other:?}");
         }
+        let light = of(|r| r.method = Some(MethodRequest::Light));
+        let why = "method light has no next events";
+        assert!(light.left_out.iter().any(|left| left.what == LIGHT_TREE && left.why == why), "{light:?}");
     }
 }

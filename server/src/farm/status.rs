@@ -7,10 +7,13 @@ use super::{
     open::read_spec,
     spec::JobSpec,
 };
-use crate::store::row::{JobFilter, JobRow, Progress, WorkerRow};
-use ovtigre_core::{path::expression::presets::shown, settings::Layer};
+use crate::store::{
+    list::{JobFilter, Place, Standing},
+    row::{JobRow, Progress, WorkerRow},
+};
+use ovtigre_core::{path::expression::presets::shown, radiosity::report::RadiosityReport, settings::Layer};
 use ovtigre_proto::{
-    curve::CurveRow,
+    curve::{CurveRow, LayerError},
     id::{JobId, WorkerId},
     status::{JobState, JobStatus, LayerStatus, Page, Scaling, WorkerState, WorkerStatus},
 };
@@ -20,6 +23,24 @@ pub const PAGE: u32 = 50;
 /// Items of a page at most.
 pub const PAGE_MAX: u32 = 500;
 
+/// What is known of a job beside its row.
+struct Known {
+    /// Its checkpoints; of a job that is settled at least the latest.
+    curve: Vec<CurveRow>,
+    /// The layers' errors at the latest.
+    layers: Vec<LayerError>,
+    /// Workers that hold one of its batches.
+    workers: u32,
+    /// How its scene was solved.
+    radiosity: Option<RadiosityReport>,
+}
+
+impl From<Standing> for Known {
+    fn from(Standing { latest, layers, workers }: Standing) -> Self {
+        Self { curve: latest.into_iter().collect(), layers, workers, radiosity: None }
+    }
+}
+
 impl Farm {
     /// A job.
     pub async fn status(&self, id: &JobId) -> Result<JobStatus> {
@@ -27,16 +48,25 @@ impl Farm {
         self.status_of(&row).await
     }
 
-    /// Jobs, the newest first.
+    /// A page of jobs. How their scenes were solved is left out.
     pub async fn jobs(&self, filter: JobFilter) -> Result<Page<JobStatus>> {
-        let limit = filter.limit.clamp(1, PAGE_MAX);
+        let (limit, by) = (filter.limit.clamp(1, PAGE_MAX), filter.order.by);
         let mut rows = self.store.jobs(JobFilter { limit: limit + 1, ..filter }).await?;
         let more = rows.len() > limit as usize;
         rows.truncate(limit as usize);
-        let next = rows.last().filter(|_| more).map(|row| row.sequence.to_string());
+        let next = rows.last().filter(|_| more).map(|row| Place::of(row, by).to_string());
+        let ids: Vec<JobId> = rows.iter().map(|row| row.id.clone()).collect();
+        let standings = self.store.standings(&ids).await?;
         let mut items = Vec::with_capacity(rows.len());
-        for row in &rows {
-            items.push(self.status_of(row).await?);
+        for (row, standing) in rows.iter().zip(standings) {
+            let spec = read_spec(row)?;
+            let known = match self.seen(&row.id, standing.workers) {
+                Some(known) => known,
+                None if row.settled => Known::from(standing),
+                // Another server has just taken it: how long it takes follows from its whole curve.
+                None => self.known(row, &spec).await?,
+            };
+            items.push(self.described(row, spec, known));
         }
         Ok(Page { items, next })
     }
@@ -49,14 +79,34 @@ impl Farm {
     /// A job that is in the store as `row`.
     pub(super) async fn status_of(&self, row: &JobRow) -> Result<JobStatus> {
         let spec = read_spec(row)?;
-        let curve = self.curve_rows(&row.id).await?;
-        let progress = self.progress(row);
-        let schedule = spec.schedule();
+        let mut known = self.known(row, &spec).await?;
+        known.radiosity = self.solution_of(&row.id, spec.settings.method).await?;
+        Ok(self.described(row, spec, known))
+    }
+
+    /// What this server has in memory of a job that `workers` work at.
+    fn seen(&self, id: &JobId, workers: u32) -> Option<Known> {
+        let view = self.live(id)?.view();
+        Some(Known { curve: view.curve, layers: view.layers, workers, radiosity: None })
+    }
+
+    async fn known(&self, row: &JobRow, spec: &JobSpec) -> Result<Known> {
         let workers = if row.state.is_over() { 0 } else { self.store.workers_of(&row.id).await? };
-        let eta_seconds = eta(row, &progress, &spec, &curve);
-        let layers = self.layers_of(&row.id, &spec).await?;
-        let radiosity = self.solution_of(&row.id, spec.settings.method).await?;
-        Ok(JobStatus {
+        if let Some(known) = self.seen(&row.id, workers) {
+            return Ok(known);
+        }
+        let curve = self.store.curve(&row.id).await?;
+        let plain = spec.settings.layers.is_empty();
+        let layers = if plain { Vec::new() } else { self.store.layers(&row.id).await? };
+        Ok(Known { curve, layers, workers, radiosity: None })
+    }
+
+    fn described(&self, row: &JobRow, spec: JobSpec, known: Known) -> JobStatus {
+        let progress = self.progress(row);
+        let eta_seconds = eta(row, &progress, &spec, &known.curve);
+        let batches_asked = spec.schedule().batches();
+        let layers = layers_of(&spec.settings.layers, &known.layers);
+        JobStatus {
             id: row.id.clone(),
             name: row.name.clone(),
             scene: row.scene.clone(),
@@ -70,13 +120,13 @@ impl Farm {
             samples_done: progress.samples,
             samples_asked: spec.samples_asked(),
             batches_done: progress.batches,
-            batches_asked: schedule.batches(),
+            batches_asked,
             wall_seconds: row.run_seconds,
             worker_seconds: progress.worker_micros as f64 * 1e-6,
             rays: progress.rays,
             invalid_samples: progress.invalid,
-            workers,
-            error: curve.last().cloned(),
+            workers: if row.state.is_over() { 0 } else { known.workers },
+            error: known.curve.into_iter().next_back(),
             error_target: spec.error_target,
             certified: row.certified,
             eta_seconds,
@@ -87,28 +137,13 @@ impl Farm {
             paths: shown(&spec.settings.paths).to_owned(),
             unreachable: spec.unreachable,
             needs: spec.needs,
-            radiosity,
+            radiosity: known.radiosity,
             layers,
             settings: spec.settings,
             region: spec.region,
             request: spec.request,
             warnings: spec.warnings,
-        })
-    }
-
-    async fn layers_of(&self, id: &JobId, spec: &JobSpec) -> Result<Vec<LayerStatus>> {
-        let layers = &spec.settings.layers;
-        let errors = match self.live(id) {
-            _ if layers.is_empty() => Vec::new(),
-            Some(live) => live.view().layers,
-            None => self.store.layers(id).await?,
-        };
-        let status = |(i, layer): (usize, &Layer)| LayerStatus {
-            name: layer.name.clone(),
-            shows: layer.shows.to_string(),
-            error: errors.get(i).copied(),
-        };
-        Ok(layers.iter().enumerate().map(status).collect())
+        }
     }
 
     /// A worker in the store.
@@ -157,6 +192,15 @@ impl Farm {
         let active_workers = active.map_or(0, |(_, workers)| u32::try_from(*workers).unwrap_or(u32::MAX));
         Ok(Scaling { desired_workers, active_workers, batches_waiting })
     }
+}
+
+fn layers_of(layers: &[Layer], errors: &[LayerError]) -> Vec<LayerStatus> {
+    let status = |(i, layer): (usize, &Layer)| LayerStatus {
+        name: layer.name.clone(),
+        shows: layer.shows.to_string(),
+        error: errors.get(i).copied(),
+    };
+    layers.iter().enumerate().map(status).collect()
 }
 
 fn worker_status(row: WorkerRow) -> WorkerStatus {

@@ -1,11 +1,11 @@
 //! What every store does: one suite, run on each.
 
 use super::{
-    Store, contract_changes as changes,
+    Store, contract_changes as changes, contract_lists as lists,
     error::StoreError,
     row::{
-        Added, BatchKey, Claim, CommitOutcome, CommitRow, IdempotencyKey, JobChange, JobFilter, Lane,
-        Mandate, NewCheckpoint, NewCommit, NewJob, Progress, Settlement,
+        Added, BatchKey, Claim, CommitOutcome, CommitRow, IdempotencyKey, JobChange, Lane, Mandate,
+        NewCheckpoint, NewCommit, NewJob, Progress, Settlement,
     },
 };
 use ovtigre_core::film::certificate::{Cause, Culprit, Doubt};
@@ -73,7 +73,9 @@ pub(super) async fn with_job(store: &dyn Store, name: &str) -> JobId {
 /// Runs the suite; `open` gives an empty store.
 pub(crate) async fn run<F: Future<Output = Arc<dyn Store>>>(open: impl Fn() -> F) {
     scenes_are_remembered_once(&*open().await).await;
-    jobs_are_listed_page_by_page(&*open().await).await;
+    lists::jobs_are_listed_page_by_page(&*open().await).await;
+    lists::jobs_are_listed_in_every_order(&*open().await).await;
+    lists::a_list_says_how_jobs_stand(&*open().await).await;
     a_key_makes_one_job(&*open().await).await;
     a_change_needs_the_version(&*open().await).await;
     a_batch_is_claimed_once(&*open().await).await;
@@ -100,34 +102,6 @@ async fn scenes_are_remembered_once(store: &dyn Store) {
     store.add_scene(SceneReport { bytes: 78, ..report.clone() }).await.unwrap();
     assert_eq!(store.scene(&hash(1)).await.unwrap().unwrap().report, report);
     assert!(store.scene(&hash(2)).await.unwrap().is_none());
-}
-
-async fn jobs_are_listed_page_by_page(store: &dyn Store) {
-    for name in ["a", "b", "c", "d"] {
-        with_job(store, name).await;
-    }
-    let list = async |state, before, limit| {
-        let rows = store.jobs(JobFilter { state, text: None, before, limit }).await.unwrap();
-        rows.into_iter().map(|row| (row.id.to_string(), row.sequence)).collect::<Vec<_>>()
-    };
-    let page = list(None, None, 3).await;
-    assert_eq!(page.iter().map(|(name, _)| name.as_str()).collect::<String>(), "dcb");
-    let rest = list(None, Some(page[2].1), 3).await;
-    assert_eq!((rest.len(), rest[0].0.as_str()), (1, "a"));
-    let change = JobChange { state: Some(JobState::Paused), ..JobChange::default() };
-    assert!(store.change_job(&id("c"), 1, change).await.unwrap());
-    assert_eq!(list(Some(JobState::Paused), None, 9).await.len(), 1);
-    assert_eq!(list(Some(JobState::Queued), None, 9).await.len(), 3);
-    for (text, found) in [("C", 1), ("", 4), ("%", 0), ("_", 0), ("'", 0), ("\\", 0)] {
-        for (state, least) in [(None, found), (Some(JobState::Paused), found.min(1))] {
-            let filter = JobFilter { state, text: Some(text.to_owned()), before: None, limit: 9 };
-            assert_eq!(store.jobs(filter).await.unwrap().len(), least, "{text} {state:?}");
-        }
-    }
-    let open: Vec<_> =
-        store.unsettled_jobs().await.unwrap().into_iter().map(|row| row.id.to_string()).collect();
-    assert_eq!(open, ["a", "b", "c", "d"], "the oldest first");
-    assert_eq!(store.counts().await.unwrap().jobs.iter().map(|(_, n)| n).sum::<u64>(), 4);
 }
 
 async fn a_key_makes_one_job(store: &dyn Store) {

@@ -3,6 +3,7 @@
 //! A store has no rules beyond atomicity and its clock. What may be done is the farm's to decide.
 
 pub mod error;
+pub mod list;
 pub mod notice;
 pub mod row;
 pub mod sql;
@@ -11,8 +12,11 @@ pub mod sql;
 pub mod contract;
 #[cfg(test)]
 mod contract_changes;
+#[cfg(test)]
+mod contract_lists;
 
 use error::Result;
+use list::{JobFilter, Standing};
 use notice::NoticeRow;
 use ovtigre_proto::{
     curve::{CurveRow, LayerError},
@@ -23,8 +27,8 @@ use ovtigre_proto::{
 };
 use row::{
     Added, BatchKey, Brought, Claim, CommitOutcome, CommitRow, Counts, Extension, IdempotencyKey, JobChange,
-    JobFilter, JobHead, JobRow, Lane, Ledger, Mandate, NewCheckpoint, NewCommit, NewJob, Progress, Released,
-    SceneRow, TokenRow, Unclaimed, WorkerRow,
+    JobHead, JobRow, Lane, Ledger, Mandate, NewCheckpoint, NewCommit, NewJob, Progress, Released, SceneRow,
+    TokenRow, Unclaimed, WorkerRow,
 };
 use std::{fmt, ops::Range, time::Duration};
 
@@ -55,8 +59,10 @@ pub trait Store: Send + Sync + fmt::Debug {
     async fn keyed(&self, key: &IdempotencyKey) -> Result<Option<Added>>;
     /// A job.
     async fn job(&self, id: &JobId) -> Result<Option<JobRow>>;
-    /// Jobs, the newest first.
+    /// A page of jobs, in the order that is asked for.
     async fn jobs(&self, filter: JobFilter) -> Result<Vec<JobRow>>;
+    /// What a list says of each of those jobs beside its row, in the same order.
+    async fn standings(&self, jobs: &[JobId]) -> Result<Vec<Standing>>;
     /// Jobs that are not over, or whose files do not have their last form, the oldest first.
     async fn unsettled_jobs(&self) -> Result<Vec<JobRow>>;
     /// What changes most of those jobs.

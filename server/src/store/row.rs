@@ -188,19 +188,6 @@ pub struct Progress {
     pub invalid: u64,
 }
 
-/// Which jobs to list, the newest first.
-#[derive(Clone, Debug)]
-pub struct JobFilter {
-    /// Only those in this state.
-    pub state: Option<JobState>,
-    /// Only those whose name or id has this in it, whatever the case of its letters A to Z.
-    pub text: Option<String>,
-    /// Only those that came before the one with this sequence.
-    pub before: Option<i64>,
-    /// At most so many.
-    pub limit: u32,
-}
-
 /// A change to a job; what is `None` stays.
 #[derive(Clone, Debug, Default)]
 pub struct JobChange {

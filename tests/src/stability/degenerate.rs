@@ -203,6 +203,7 @@ fn layers() -> Case {
 fn in_sky(
     name: String,
     stresses: &'static str,
+    note: &'static str,
     glb: impl Fn() -> Vec<u8> + Clone + Send + Sync + 'static,
 ) -> Case {
     Case {
@@ -210,7 +211,7 @@ fn in_sky(
         name,
         stresses,
         known: "clear glass cannot be seen in a uniform sky: 0.7".to_owned(),
-        note: "",
+        note,
         trials: mean_is_by(
             &[Method::Path],
             glb,
@@ -235,12 +236,18 @@ fn shells() -> Case {
     in_sky(
         "100 shells of glass in each other".to_owned(),
         "hundreds of crossings and reflections a path",
+        "",
         glb,
     )
 }
 
 /// Solid spheres of glass, each in the next: every one is entered before any is left.
 fn nested(count: u32) -> Case {
+    let note = if count > 50 {
+        "The radiance of what is let in is multiplied by 1.1²⁰⁰, and facets that are not quite a sphere trap it: with roulette against trapped walks from the 2²⁰th reflection on, and not from the 2048th, a walk is still on its way after minutes. Few paths get out and count for very many."
+    } else {
+        ""
+    };
     let glb = move || {
         let mut glb = Glb::new();
         for i in 0..count {
@@ -252,6 +259,7 @@ fn nested(count: u32) -> Case {
     in_sky(
         format!("{count} solids of glass in each other"),
         "η² of every solid that is entered before one is left",
+        note,
         glb,
     )
 }

@@ -9,7 +9,7 @@ use super::{
 use crate::picture::mean_and_error;
 use glam::{DVec3, Vec3};
 use ovtigre_core::bsdf::ggx::{Ggx, Reach, reflect};
-use std::f64::consts::PI;
+use std::f64::consts::{FRAC_PI_2, PI};
 
 const GROUP: &str = "Gloss";
 /// 1e-4 and 3e-4 are ideal mirrors: the least α that is a lobe is 1e-3.
@@ -135,7 +135,9 @@ fn sampling() -> Case {
     }
 }
 
-/// ∫ D G₂ (wo·h)⁺ / cos θₒ dh: slopes of microfacets have tan² θ = α² u / (1 − u), u uniform; u = 1 − v² keeps the ends finite.
+/// ∫ D G₂ (wo·h)⁺ / cos θₒ dh: slopes of microfacets have tan θ = α tan ξ with the density sin 2ξ. At grazing angles the integrand changes
+/// within cos θₒ of ξ = 0, of ξ = π/2 and of the azimuth π/2, so that steps go to zero there. With 1200² of them it is within
+/// 2 · 10⁻⁶ of 4800² for all α and angles here.
 fn albedo(alpha: f64, mu: f64) -> f64 {
     const N: u32 = 1200;
     let sin = (1.0 - mu * mu).sqrt();
@@ -144,16 +146,20 @@ fn albedo(alpha: f64, mu: f64) -> f64 {
     let own = lambda(mu);
     let mut sum = 0.0;
     for i in 0..N {
-        let v = (f64::from(i) + 0.5) / f64::from(N);
-        let tan = alpha * (1.0 - v * v).sqrt() / v;
+        let t = (f64::from(i) + 0.5) / f64::from(N);
+        let xi = FRAC_PI_2 * t.powi(3) * (10.0 - 15.0 * t + 6.0 * t * t);
+        let step = FRAC_PI_2 * 30.0 * (t * (1.0 - t)).powi(2);
+        let tan = alpha * xi.tan();
         let cos = 1.0 / (1.0 + tan * tan).sqrt();
         for j in 0..N {
-            let (s, c) = (PI * (f64::from(j) + 0.5) / f64::from(N)).sin_cos();
+            let t = 2.0 * (f64::from(j) + 0.5) / f64::from(N) - 1.0;
+            let (s, c) = (FRAC_PI_2 * (1.0 + t.powi(3))).sin_cos();
             let half = DVec3::new(tan * cos * c, tan * cos * s, cos);
             let dot = wo.dot(half);
             let z = 2.0 * dot * cos - mu;
             if dot > 0.0 && z > 0.0 {
-                sum += 2.0 * v * dot / (mu * cos) / (1.0 + own + lambda(z));
+                let weight = step * (2.0 * xi).sin() * 3.0 * t * t;
+                sum += weight * dot / (mu * cos) / (1.0 + own + lambda(z));
             }
         }
     }

@@ -49,11 +49,16 @@ pub fn hit_environment<S: Throughput<EyeState>, L: Throughput<LightState>>(
         direction,
         1.0,
     );
+    let mut next_event = if walk.scatterings > 0 && scene.lights.are_by_tree() {
+        scene.lights.environment_pdf(environment, &walk.edge.from, direction)
+    } else {
+        emission.origin
+    };
     if walk.edge.kind == EdgeKind::Parallel {
         // Parallel rays all meet the same point of the sky: no other technique does.
-        emission.origin = 0.0;
+        (emission.origin, next_event) = (0.0, 0.0);
     }
-    let next_event = f64::from(emission.origin);
+    let next_event = f64::from(next_event);
     deposit::<S, L>(walk, &Hit { light, radiance, next_event, emission, jacobian: walk.edge.cos }, tally);
 }
 
@@ -82,7 +87,7 @@ pub fn hit_surface<S: Throughput<EyeState>, L: Throughput<LightState>>(
     let next_event = if walk.scatterings == 0 {
         f64::from(emission.origin)
     } else {
-        let pdf = scene.lights.triangle_pdf(&scene.data, triangle, walk.edge.from, at, direction);
+        let pdf = scene.lights.triangle_pdf(&scene.data, triangle, &walk.edge.from, at, direction);
         f64::from(pdf) * cos / squared
     };
     let jacobian = walk.edge.cos / squared;

@@ -30,8 +30,8 @@ pub fn next_event<S: Throughput<EyeState>, L: Throughput<LightState>>(
     }
     let (scene, rules) = (walk.scene, walk.rules);
     let (choice, place) = (walk.numbers.light(), walk.numbers.light_point());
-    let (point, moment) = (vertex.at.position, vertex.at.moment);
-    let sampled = scene.lights.sample(&scene.data, scene.environment.as_ref(), moment, point, choice, place);
+    let (lit, moment) = (vertex.lit(), vertex.at.moment);
+    let sampled = scene.lights.sample(&scene.data, scene.environment.as_ref(), moment, &lit, choice, place);
     let Some((light, event)) = sampled else { return };
     let Some(start) = rules.language.light_start(rules.tag(light)) else { return };
     let (value, bsdf_pdf) = vertex.evaluate(event.direction, Transport::Radiance);

@@ -2,7 +2,7 @@
 
 use super::{
     column::{commit as commit_row, count, from_json, to_json},
-    connection::Db,
+    connection::{Db, Row},
     merger::require,
     query::query,
 };
@@ -97,18 +97,20 @@ pub(super) async fn layers(db: &mut Db, job: &JobId) -> Result<Vec<LayerError>> 
 /// A job's checkpoints in order.
 pub(super) async fn curve(db: &mut Db, job: &JobId) -> Result<Vec<CurveRow>> {
     let rows = query("SELECT * FROM checkpoint WHERE job = $1 ORDER BY look").bind(job.as_str());
-    let read = |row: &super::connection::Row| {
-        Ok(CurveRow {
-            samples: count(row, "samples")?,
-            wall_seconds: row.real("wall_seconds")?,
-            worker_seconds: row.real("worker_seconds")?,
-            rays: count(row, "rays")?,
-            rms_error: row.real_or_none("rms_error")?,
-            relative_error: row.real_or_none("relative_error")?,
-            relative_error_upper: row.real_or_none("relative_error_upper")?,
-            target_expected_at_seconds: row.real_or_none("target_expected_at_seconds")?,
-            doubt: row.text_or_none("doubt")?.map(|_| from_json(row, "doubt")).transpose()?,
-        })
-    };
-    db.all(rows).await?.iter().map(read).collect()
+    db.all(rows).await?.iter().map(curve_row).collect()
+}
+
+/// Columns of a checkpoint.
+pub(super) fn curve_row(row: &Row) -> Result<CurveRow> {
+    Ok(CurveRow {
+        samples: count(row, "samples")?,
+        wall_seconds: row.real("wall_seconds")?,
+        worker_seconds: row.real("worker_seconds")?,
+        rays: count(row, "rays")?,
+        rms_error: row.real_or_none("rms_error")?,
+        relative_error: row.real_or_none("relative_error")?,
+        relative_error_upper: row.real_or_none("relative_error_upper")?,
+        target_expected_at_seconds: row.real_or_none("target_expected_at_seconds")?,
+        doubt: row.text_or_none("doubt")?.map(|_| from_json(row, "doubt")).transpose()?,
+    })
 }

@@ -12,7 +12,10 @@ use crate::store::{
     error::{Result, StoreError},
     row::{BatchKey, Claim, CommitOutcome, NewCommit},
 };
-use ovtigre_proto::{id::BlobId, status::JobState};
+use ovtigre_proto::{
+    id::{BlobId, JobId},
+    status::JobState,
+};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, HashMap};
 
@@ -53,6 +56,17 @@ fn bound(query: Query, rows: Vec<Value>) -> Query {
 /// A batch as the first four columns of a row.
 fn place(job: &impl ToString, at: BatchKey) -> [Value; 4] {
     [job.to_string().into(), at.region.into(), at.replicate.into(), at.block.into()]
+}
+
+/// The latest checkpoint of each job and how many workers hold batches of it, in the order of the jobs.
+pub(super) fn of_jobs(jobs: &[JobId]) -> Query {
+    let statement = over!(
+        [0 job text],
+        "SELECT c.*, (SELECT count(DISTINCT worker) FROM lease WHERE lease.job = item.job) AS workers
+         FROM item LEFT JOIN checkpoint AS c ON c.job = item.job
+         AND c.look = (SELECT max(look) FROM checkpoint AS d WHERE d.job = item.job) ORDER BY n"
+    );
+    bound(statement, jobs.iter().map(|job| json!([job.as_str()])).collect())
 }
 
 /// What is known of a batch before it is handed out.

@@ -9,9 +9,7 @@ use super::{
 };
 use crate::store::{
     error::Result,
-    row::{
-        Added, IdempotencyKey, JobChange, JobFilter, JobHead, JobRow, NewJob, Progress, SceneRow, Settlement,
-    },
+    row::{Added, IdempotencyKey, JobChange, JobHead, JobRow, NewJob, Progress, SceneRow, Settlement},
 };
 use ovtigre_proto::{
     id::{BlobId, JobId},
@@ -82,41 +80,6 @@ pub(super) async fn get(db: &mut Db, id: &JobId) -> Result<Option<JobRow>> {
     row.map(|row| read(&row, now)).transpose()
 }
 
-/// Jobs, the newest first.
-pub(super) async fn list(db: &mut Db, filter: JobFilter) -> Result<Vec<JobRow>> {
-    let now = db.now().await?;
-    let before = filter.before.unwrap_or(i64::MAX);
-    if let Some(text) = filter.text {
-        let sql = "SELECT * FROM job WHERE sequence < $1 AND (state = $3 OR $3 = '')
-             AND (lower(name) LIKE $4 ESCAPE '\\' OR lower(id) LIKE $4 ESCAPE '\\')
-             ORDER BY sequence DESC LIMIT $2";
-        let state = filter.state.map_or("", JobState::name);
-        let rows = query(sql).bind(before).bind(filter.limit).bind(state).bind(pattern(&text));
-        return db.all(rows).await?.iter().map(|row| read(row, now)).collect();
-    }
-    let rows = match filter.state {
-        None => query("SELECT * FROM job WHERE sequence < $1 ORDER BY sequence DESC LIMIT $2").bind(before),
-        Some(state) => {
-            let sql = "SELECT * FROM job WHERE sequence < $1 AND state = $3 ORDER BY sequence DESC LIMIT $2";
-            let rows = query(sql).bind(before).bind(filter.limit).bind(state.name());
-            return db.all(rows).await?.iter().map(|row| read(row, now)).collect();
-        }
-    };
-    db.all(rows.bind(filter.limit)).await?.iter().map(|row| read(row, now)).collect()
-}
-
-/// What LIKE finds `text` with, wherever it is.
-fn pattern(text: &str) -> String {
-    let mut pattern = "%".to_owned();
-    for c in text.chars() {
-        if matches!(c, '%' | '_' | '\\') {
-            pattern.push('\\');
-        }
-        pattern.push(c.to_ascii_lowercase());
-    }
-    pattern + "%"
-}
-
 /// Jobs that are not over or have no last form, the oldest first.
 pub(super) async fn unsettled(db: &mut Db) -> Result<Vec<JobRow>> {
     let now = db.now().await?;
@@ -146,7 +109,8 @@ pub(super) async fn heads(db: &mut Db) -> Result<Vec<JobHead>> {
     db.all(rows.bind(now)).await?.iter().map(read).collect()
 }
 
-fn read(row: &Row, now: i64) -> Result<JobRow> {
+/// A job's columns; `now` is the time.
+pub(super) fn read(row: &Row, now: i64) -> Result<JobRow> {
     let (started, ended) = (row.whole_or_none("started_ms")?, row.whole_or_none("ended_ms")?);
     let until = match (ended, row.whole_or_none("paused_since_ms")?) {
         (Some(end), _) => end,

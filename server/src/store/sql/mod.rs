@@ -10,6 +10,7 @@ mod control;
 mod gathered;
 mod job;
 mod ledger;
+mod list;
 mod merger;
 mod notice;
 mod open;
@@ -22,11 +23,12 @@ mod writer;
 use super::{
     Sharing, Store,
     error::{Result, StoreError},
+    list::{JobFilter, Standing},
     notice::NoticeRow,
     row::{
         Added, BatchKey, Brought, Claim, CommitOutcome, CommitRow, Counts, Extension, IdempotencyKey,
-        JobChange, JobFilter, JobHead, JobRow, Lane, Ledger, Mandate, NewCheckpoint, NewCommit, NewJob,
-        Progress, Released, SceneRow, TokenRow, Unclaimed, WorkerRow,
+        JobChange, JobHead, JobRow, Lane, Ledger, Mandate, NewCheckpoint, NewCommit, NewJob, Progress,
+        Released, SceneRow, TokenRow, Unclaimed, WorkerRow,
     },
 };
 use connection::Db;
@@ -106,7 +108,11 @@ impl Store for Sql {
     }
 
     async fn jobs(&self, filter: JobFilter) -> Result<Vec<JobRow>> {
-        job::list(&mut self.reader().await?, filter).await
+        list::list(&mut self.reader().await?, filter).await
+    }
+
+    async fn standings(&self, jobs: &[JobId]) -> Result<Vec<Standing>> {
+        list::standings(&mut self.reader().await?, jobs).await
     }
 
     async fn unsettled_jobs(&self) -> Result<Vec<JobRow>> {
