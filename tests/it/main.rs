@@ -25,6 +25,7 @@ mod radiosity;
 mod same_bits;
 mod slope;
 mod stability;
+mod stripped;
 mod techniques;
 mod telemetry;
 mod tidy;

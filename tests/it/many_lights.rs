@@ -92,10 +92,12 @@ fn threads_do_not_matter() {
 }
 
 #[test]
-fn few_lights_have_no_tree() {
+fn few_lights_and_parts_of_one_have_no_tree() {
     let settings = settings(4, 4, 1);
-    assert!(!scene(&lamps(4, Hall::Open), &settings).scene.lights.are_by_tree());
-    assert!(scene(&lamps(300, Hall::Open), &settings).scene.lights.are_by_tree());
+    let has_tree = |n, hall, settings: &Settings| scene(&lamps(n, hall), settings).scene.lights.are_by_tree();
+    assert!(!has_tree(3, Hall::Open, &settings));
+    assert!(!has_tree(300, Hall::OneLamp, &settings));
+    assert!(has_tree(300, Hall::Open, &settings));
     let light = Settings { method: Method::Light, ..settings };
-    assert!(!scene(&lamps(300, Hall::Open), &light).scene.lights.are_by_tree(), "there are no next events");
+    assert!(!has_tree(300, Hall::Open, &light), "there are no next events");
 }

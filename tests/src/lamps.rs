@@ -20,6 +20,8 @@ pub enum Hall {
     Open,
     /// Blocks, in 16 rooms without ceilings.
     Rooms,
+    /// Blocks, and all lamps are parts of one, 1 m wide and 5 m up: nothing to choose.
+    OneLamp,
 }
 
 /// A floor of 20 × 20 m, seen whole from above, with `n` lamps that shine down on it: triangles, as far apart as they find
@@ -27,11 +29,13 @@ pub enum Hall {
 pub fn lamps(n: u32, hall: Hall) -> Vec<u8> {
     let mut glb = Glb::new();
     add(&mut glb, "floor", lambert(0.6, 0.0), floor(0.0, SIDE, 0.0, 0.0));
-    let across = (1..).find(|across| across * across >= n).unwrap_or(1);
-    let apart = SIDE / across as f32;
+    let across = (1..=n).find(|across| across * across >= n).unwrap_or(1);
+    let width = if hall == Hall::OneLamp { 1.0 } else { SIDE };
+    let apart = width / across as f32;
+    let height = if hall == Hall::OneLamp { 5.0 } else { (0.5 * apart).min(1.0) };
     let place = |i: u32, by: Vec2| {
-        let at = |cell: u32, by: f32| (cell as f32 + 0.2 + 0.6 * by) * apart - SIDE / 2.0;
-        Vec3::new(at(i % across, by.x), (0.5 * apart).min(1.0), at(i / across, by.y))
+        let at = |cell: u32, by: f32| (cell as f32 + 0.2 + 0.6 * by) * apart - width / 2.0;
+        Vec3::new(at(i % across, by.x), height, at(i / across, by.y))
     };
     let mut lamps: [(Vec<Vec3>, Vec<[u32; 3]>); RADIANCES.len()] = Default::default();
     // Cells that stay dark are spread like the others.

@@ -9,6 +9,7 @@ use crate::gltf::meshopt::compressed;
 use crate::gltf::uri::{self, Target};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The buffers of a document, each as long as it says.
 pub(crate) struct Buffers<'a> {
@@ -20,6 +21,8 @@ pub(crate) struct Buffers<'a> {
     decoded: BTreeMap<usize, Vec<u8>>,
     /// What compressed primitives have filled accessors with, by index.
     filled: BTreeMap<usize, Filled>,
+    /// Whether each buffer view was looked at.
+    seen: Vec<AtomicBool>,
 }
 
 /// A slice of a buffer, and the distance of its elements where the view says one.
@@ -60,8 +63,9 @@ impl<'a> Buffers<'a> {
         mut binary: Option<Cow<'a, [u8]>>,
         limits: &Limits,
     ) -> Result<Self, LoadError> {
-        let mut buffers =
-            Self { bytes: Vec::new(), same: Vec::new(), decoded: BTreeMap::new(), filled: BTreeMap::new() };
+        let seen = (0..document.count("bufferViews")).map(|_| AtomicBool::new(false)).collect();
+        let (decoded, filled) = (BTreeMap::new(), BTreeMap::new());
+        let mut buffers = Self { bytes: Vec::new(), same: Vec::new(), decoded, filled, seen };
         let items = document.list("buffers")?;
         let mut known: BTreeMap<&str, usize> = BTreeMap::new();
         let mut total = 0_u64;
@@ -114,6 +118,16 @@ impl<'a> Buffers<'a> {
         self.filled.get(&accessor)
     }
 
+    /// Whether there are compressed buffer views.
+    pub(crate) fn are_compressed(&self) -> bool {
+        !self.decoded.is_empty()
+    }
+
+    /// Buffer views that were looked at so far.
+    pub(crate) fn seen(&self) -> Vec<bool> {
+        self.seen.iter().map(|seen| seen.load(Ordering::Relaxed)).collect()
+    }
+
     fn whole(&self, index: usize) -> Option<&[u8]> {
         self.bytes[self.same[index]].as_deref()
     }
@@ -121,6 +135,7 @@ impl<'a> Buffers<'a> {
     /// The bytes of a buffer view.
     pub(crate) fn view(&self, document: &Document, index: usize) -> Result<View<'_>, LoadError> {
         let item = document.item("bufferViews", index)?;
+        self.seen[index].store(true, Ordering::Relaxed);
         let buffer = item.need("buffer")?.as_index("buffers", self.bytes.len())?;
         let offset = item.whole("byteOffset")?.unwrap_or(0);
         let length = item.whole("byteLength")?.ok_or_else(|| item.error("\"byteLength\" is missing"))?;

@@ -15,13 +15,21 @@ const NAME: &str = "EXT_lights_image_based";
 /// Most pixels along the edge of a face: an environment of four by two faces is made of them.
 const SIDE_MAX: u32 = 2048;
 
+/// What was read.
+pub(crate) struct ImageBased {
+    /// The light.
+    pub environment: Arc<Environment>,
+    /// Indices of the pictures that it was read from.
+    pub pictures: Vec<usize>,
+}
+
 /// The light that the scene names. Its sharpest pictures are the light itself; those made for rough surfaces, and
 /// the coefficients of irradiance, are what a render finds by itself. Pictures are `RGBD`: sRGB over alpha.
 pub(crate) fn read(
     bundle: &Bundle,
     source: Source<'_>,
     problems: &mut Problems,
-) -> Result<Option<Arc<Environment>>, LoadError> {
+) -> Result<Option<ImageBased>, LoadError> {
     let Some(light) = named(source.document)? else { return Ok(None) };
     let mut faces = Vec::new();
     let images = source.document.count("images");
@@ -35,7 +43,8 @@ pub(crate) fn read(
         let at = first.element(i)?;
         faces.push(at.as_index("images", images)?);
     }
-    let faces = pictures::read(bundle, source, &faces, problems)?;
+    let indices = faces;
+    let faces = pictures::read(bundle, source, &indices, problems)?;
     let side = faces[0].width;
     if let Some(odd) = faces.iter().position(|face| (face.width, face.height) != (side, side)) {
         let Picture { width, height, .. } = *faces[odd];
@@ -49,7 +58,8 @@ pub(crate) fn read(
     let turn = turn(&light)?;
     let cube = Cube::new(&faces);
     let radiance = |direction: Vec3| cube.radiance(turn * direction) * intensity;
-    Ok(Some(Arc::new(Environment::of(4 * side as usize, 2 * side as usize, radiance))))
+    let environment = Environment::of(4 * side as usize, 2 * side as usize, radiance);
+    Ok(Some(ImageBased { environment: Arc::new(environment), pictures: indices }))
 }
 
 /// The light of the scene that is shown.

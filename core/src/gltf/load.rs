@@ -49,8 +49,27 @@ pub struct Choice<'a> {
     pub variant: Option<&'a str>,
 }
 
+/// What of a document was looked at to read its scene.
+pub(crate) struct Used {
+    /// Of each buffer view, whether it was.
+    pub(crate) views: Vec<bool>,
+    /// The pictures, by index.
+    pub(crate) images: Vec<usize>,
+    /// Whether there are compressed buffer views.
+    pub(crate) compressed: bool,
+}
+
 /// Reads a scene as [`load`] does, as it moves while the shutter is open. All animations of the file play together.
 pub fn load_as(bundle: &Bundle, limits: &Limits, choice: &Choice<'_>) -> Result<Loaded, LoadError> {
+    Ok(load_and_note(bundle, limits, choice)?.0)
+}
+
+/// The same, and what was looked at.
+pub(crate) fn load_and_note(
+    bundle: &Bundle,
+    limits: &Limits,
+    choice: &Choice<'_>,
+) -> Result<(Loaded, Used), LoadError> {
     let times = choice.times;
     let parts = bundle.parts()?;
     let document = Document::parse(bundle.name(), &parts.json, limits)?;
@@ -78,6 +97,11 @@ pub fn load_as(bundle: &Bundle, limits: &Limits, choice: &Choice<'_>) -> Result<
     let animated = count_animated(&animation, &tree, &shapes);
     let (meshes, instances) = count_uses(&shapes);
     let pictures = pictures::read(bundle, source, &table.images(), &mut problems)?;
+    let (environment, faces) = (image_based::read(bundle, source, &mut problems)?)
+        .map(|light| (light.environment, light.pictures))
+        .unzip();
+    let images = table.images().into_iter().chain(faces.into_iter().flatten()).collect();
+    let used = Used { views: source.buffers.seen(), images, compressed: source.buffers.are_compressed() };
     survey::survey(bundle, source, &table.images(), &mut problems);
     let textures = table.finish(&pictures);
     let (materials, ids) = number_materials(&document, read, &shapes, &textures)?;
@@ -90,7 +114,7 @@ pub fn load_as(bundle: &Bundle, limits: &Limits, choice: &Choice<'_>) -> Result<
         textures,
         cameras: cameras::read(&document, &stage, &normalisation, &mut problems)?,
         punctual: lights::read(&document, &stage, &normalisation, &mut problems)?,
-        environment: image_based::read(bundle, source, &mut problems)?,
+        environment,
         bounds,
         normalisation,
         knots: stage.knots.clone(),
@@ -102,7 +126,7 @@ pub fn load_as(bundle: &Bundle, limits: &Limits, choice: &Choice<'_>) -> Result<
     let variants = variants::names(&document)?;
     let report = Report { variants, animated, ..Report::of(&scene, meshes, instances, dropped) };
     point_out_what_is_missing(&scene, &report, &mut problems);
-    Ok(Loaded { scene, warnings: problems.finish(), report })
+    Ok((Loaded { scene, warnings: problems.finish(), report }, used))
 }
 
 fn check_version(document: &Document) -> Result<(), LoadError> {

@@ -5,6 +5,7 @@ pub mod error;
 pub mod limits;
 pub mod load;
 pub mod report;
+pub mod strip;
 
 mod accessor;
 mod animation;

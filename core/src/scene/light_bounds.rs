@@ -12,6 +12,8 @@ const MARGIN: f64 = 1e-3;
 const OUTSIDE: f64 = 1e-6;
 /// The least cosine of what may count: bent normals and gloss may show light at grazing angles.
 const LEAST: f64 = 1.0 / 32.0;
+/// The nearest of some lights is taken to be at least this share of their sphere's radius away.
+const NEAREST: f64 = 1.0 / 16.0;
 /// Triangles whose normal is less certain than this many radians may face anywhere.
 const UNCERTAIN: f64 = 0.1;
 
@@ -151,6 +153,8 @@ impl LightBounds {
 pub struct Cluster {
     centre: Vec3,
     radius: f32,
+    /// Half the edges of their box.
+    half: Vec3,
     axis: Vec3,
     /// Cosine and sine of the spread.
     spread: [f32; 2],
@@ -171,6 +175,7 @@ impl Cluster {
         Self {
             centre,
             radius,
+            half: (upper - centre).max(centre - lower),
             axis: cone.axis.as_vec3(),
             spread: [cos as f32, sin.max(0.0) as f32],
             reach: libm::cos(cone.reach) as f32,
@@ -180,12 +185,16 @@ impl Cluster {
     }
 
     /// What these lights may count at a point, nothing in the way: intensity · cosines / distance² (equation 2 and §5.3),
-    /// no less than that of most of them, and always positive.
+    /// always positive. The cosines are the greatest of any of them; the square is the least distance times the greatest: the
+    /// mean of 1 / distance² of lights spread over a line that leads away from the point. With the distance to the middle,
+    /// parts all around a point would count alike.
     #[inline]
     pub fn importance(&self, lit: &Lit) -> f64 {
         let to = self.centre.as_dvec3() - lit.point.as_dvec3();
         let (squared, near) = (to.length_squared(), f64::from(self.radius) * f64::from(self.radius));
-        let over = self.intensity / squared.max(near).max(1e-100);
+        let beyond = (to.abs() - self.half.as_dvec3()).max(DVec3::ZERO).length();
+        let radius = f64::from(self.radius);
+        let over = self.intensity / (beyond.max(NEAREST * radius) * (squared.sqrt() + radius)).max(1e-100);
         if squared <= near {
             return over;
         }
@@ -233,7 +242,7 @@ pub(super) mod tests {
                 let sampler = Sampler::new(1, 0, [i, 0], 0);
                 let place = around(&sampler, 0) * 2.0 * size;
                 let choice = sampler.pair(Dimension::Film);
-                let intensity = f64::from(libm::exp2f(-decades * 3.32 * choice.x));
+                let intensity = libm::exp2(-3.32 * f64::from(decades * choice.x));
                 let [a, b] = [1, 2].map(|k| around(&sampler, k) * length);
                 match i % 4 {
                     0 => LightBounds::of_point(&[place], intensity),
@@ -263,8 +272,8 @@ pub(super) mod tests {
 
     /// Importance without intensity and distance: the cosines.
     fn cosines(cluster: &Cluster, lit: &Lit) -> f64 {
-        let squared = f64::from((cluster.centre - lit.point).length_squared());
-        cluster.importance(lit) * squared.max(f64::from(cluster.radius).powi(2)) / cluster.intensity
+        let alone = Cluster { spread: [-1.0, 0.0], reach: 0.0, ..*cluster };
+        cluster.importance(lit) / alone.importance(&Lit { from: LitFrom::Everywhere, ..*lit })
     }
 
     #[test]
@@ -302,9 +311,12 @@ pub(super) mod tests {
         let point = Cluster::new(&LightBounds::of_point(&[place], 3.0));
         // Intensity · cos / distance².
         assert!((point.importance(&lit) - 3.0 * 0.8 / 0.25).abs() < 1e-5);
-        let corners = [place, place + Vec3::X * 1e-4, place + Vec3::Z * 1e-4];
+        // Around the place; its size lets it count a little more.
+        let corners = [[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0]];
+        let corners = corners.map(|[x, z]| place + 1e-3 * Vec3::new(x, 0.0, z));
         let down = Cluster::new(&LightBounds::of_triangle(corners, Sides::Front, 3.0));
-        assert!((down.importance(&lit) - 3.0 * 0.8 * 0.8 / 0.25).abs() < 1e-2);
+        let more = down.importance(&lit) - 3.0 * 0.8 * 0.8 / 0.25;
+        assert!((0.0..0.06).contains(&more), "{more}");
         let up = LightBounds::of_triangle([corners[0], corners[2], corners[1]], Sides::Front, 3.0);
         assert!(Cluster::new(&up).importance(&lit) < 1e-4);
         let both = LightBounds::of_triangle([corners[0], corners[2], corners[1]], Sides::Both, 3.0);

@@ -2,6 +2,7 @@
 
 use crate::math::choice::AliasTable;
 use crate::math::colour::luminance;
+use crate::scene::bounds::Bounds;
 use crate::scene::data::SceneData;
 use crate::scene::light::Light;
 use crate::scene::light_bounds::LightBounds;
@@ -13,9 +14,12 @@ use crate::trace::moment::Moment;
 use core::f64::consts::PI;
 use glam::{Vec2, Vec3};
 
-/// As many lights that are somewhere make a tree worth its steps. `cargo run -p ovtigre-tests --bin lights` tells; the table is
-/// in docs/PERFORMANCE.md.
-pub const TREE_FROM: usize = 32;
+/// As many lights that are somewhere make a tree worth its steps (`cargo run -p ovtigre-tests --bin lights`; the table is in
+/// docs/PERFORMANCE.md), where
+const TREE_FROM: usize = 4;
+/// their places have a sphere of at least this share of the scene's radius: of one lamp made of many triangles, each counts
+/// about the same everywhere, and the tree only took time.
+const SPREAD: f64 = 0.25;
 /// Least share of next events to what is somewhere, and to what is infinitely far, where there is both: powers do not say
 /// which of them reaches a point.
 const LEAST: f64 = 1.0 / 16.0;
@@ -96,14 +100,28 @@ impl Nearby {
     }
 }
 
-/// Whether a scene has enough lights that are somewhere for a tree.
+/// Whether a scene has enough lights that are somewhere, and apart from each other, for a tree.
 pub fn is_worth_a_tree(data: &SceneData) -> bool {
-    let somewhere = |kind: &PunctualKind| !matches!(kind, PunctualKind::Directional { .. });
-    let points = data.punctual.iter().filter(|punctual| somewhere(&punctual.kind)).map(|_| ());
+    let (mut count, mut bounds) = (0, Bounds::EMPTY);
+    for punctual in &data.punctual {
+        if let PunctualKind::Point { position, .. } | PunctualKind::Spot { position, .. } = punctual.kind {
+            count += 1;
+            bounds.include(position.as_dvec3());
+        }
+    }
     let emits: Vec<bool> = data.materials.iter().map(Material::emits).collect();
-    let materials = data.instances.iter().flat_map(|i| &data.meshes[i.mesh.index()].materials);
-    let triangles = materials.filter(|material| emits[material.index()]).map(|_| ());
-    points.chain(triangles).take(TREE_FROM).count() == TREE_FROM
+    for (i, instance) in data.instances.iter().enumerate() {
+        for (t, material) in data.meshes[instance.mesh.index()].materials.iter().enumerate() {
+            if emits[material.index()] {
+                count += 1;
+                let corners = data.corners(i as u32, t as u32, data.knots.moment(0.0));
+                for corner in corners {
+                    bounds.include(corner.as_dvec3());
+                }
+            }
+        }
+    }
+    count >= TREE_FROM && bounds.radius() >= SPREAD * data.bounds.radius()
 }
 
 /// Where a light is, which way it shines and how strongly; `None` where it is infinitely far.

@@ -214,7 +214,7 @@ impl Farm {
 
     async fn decode(&self, live: &Live, batch: Batch, partial: Bytes) -> Result<Decoded> {
         let _turn = self.decoders.acquire().await.map_err(|_| FarmError::Stopping)?;
-        let (job, scene) = (live.id.clone(), live.scene.clone());
+        let (job, scene) = (live.id.clone(), live.spec.fetched(&live.scene).clone());
         let method = live.spec.settings.method.name();
         let planes = live.spec.settings.planes() as usize;
         let decoded = blocking(move || {

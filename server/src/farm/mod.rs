@@ -35,6 +35,7 @@ pub mod spec;
 pub mod split;
 pub mod status;
 pub mod stop;
+mod strip;
 pub mod submit;
 
 #[cfg(test)]

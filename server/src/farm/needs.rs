@@ -29,7 +29,7 @@ pub fn needs(scene: &SceneContents, settings: &Settings, words: Letters) -> Need
     for what in &scene.leaves_out {
         let why = match what.as_str() {
             DEFAULT_SKY => "the scene has light",
-            LIGHT_TREE => "the scene has few lights",
+            LIGHT_TREE => "its lights are few, or close together",
             _ => "the scene has none",
         };
         leave(&mut list, what, why);

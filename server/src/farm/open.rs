@@ -140,7 +140,8 @@ impl Farm {
         let settings = live.spec.settings.clone();
         let wants = live.spec.wants(row.class.clone());
         let order = (row.priority, row.sequence);
-        let entry = book::Entry::new(row.scene.clone(), settings, plan, order, hand_out, wants);
+        let entry =
+            book::Entry::new(live.spec.fetched(&row.scene).clone(), settings, plan, order, hand_out, wants);
         let mut book = self.book();
         book.add(row.id.clone(), entry);
         ledger.leases.into_iter().for_each(|lease| book.hold(lease, None, 0));

@@ -70,6 +70,8 @@ pub struct Rules {
     pub reserve_bytes: u64,
     /// Largest upload.
     pub scene_bytes: u64,
+    /// Files from so many bytes on are stripped of what a job does not read: smaller ones are fetched sooner than they are read.
+    pub strip_from: u64,
 }
 
 impl Default for Rules {
@@ -103,6 +105,7 @@ impl Default for Rules {
             room: Room::endless(),
             reserve_bytes: 1 << 30,
             scene_bytes: 2 << 30,
+            strip_from: 1 << 20,
         }
     }
 }

@@ -44,6 +44,9 @@ pub struct JobSpec {
     pub needs: Needs,
     /// Why the method was chosen.
     pub method_reason: String,
+    /// What its workers fetch, where that is not the scene itself.
+    #[serde(default)]
+    pub fetched: Option<BlobId>,
     /// What was tried to choose it, if anything was.
     #[serde(default)]
     pub pilot: Option<Pilot>,
@@ -93,6 +96,11 @@ impl JobSpec {
             * u64::from(self.settings.planes())
             * u64::from(self.settings.replicates)
             * 24
+    }
+
+    /// The file that its workers fetch and render.
+    pub fn fetched<'a>(&'a self, scene: &'a BlobId) -> &'a BlobId {
+        self.fetched.as_ref().unwrap_or(scene)
     }
 
     /// Hash of all that a sum depends on beside its batch.

@@ -140,6 +140,7 @@ impl Farm {
         let webhook = self.webhook(&request)?;
         let mut spec = self.check(request).await?;
         self.has_room_for(owner.as_deref())?;
+        self.strip(&mut spec).await?;
         spec.owner = owner;
         let id = self.ids.job();
         let scene = spec.request.scene.clone().expect("checked: a scene is there");
@@ -269,6 +270,7 @@ pub fn resolve(
         owner: None,
         by_chance: by_chance(chosen.method, letters(scene), scene.brightest),
         needs: Needs::default(),
+        fetched: None,
         method_reason: chosen.reason.to_owned(),
         pilot: None,
         unreachable,

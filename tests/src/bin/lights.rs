@@ -1,5 +1,5 @@
 //! Measures the choice among many lights by a tree against that by their power, and prints the table of
-//! docs/PERFORMANCE.md: `cargo run -p ovtigre-tests --bin lights -- [--seconds N] [--most LIGHTS]`.
+//! docs/PERFORMANCE.md: `cargo run -p ovtigre-tests --bin lights -- [--seconds N] [--most LIGHTS] [--hall NAME]`.
 //!
 //! Time is that of one thread on a processor, so that others on the machine count little.
 
@@ -12,16 +12,17 @@ use ovtigre_tests::{
 use std::io::Write as _;
 
 const REPLICATES: u32 = 16;
-const LIGHTS: [u32; 13] = [1, 2, 4, 8, 16, 32, 64, 100, 128, 256, 1_000, 10_000, 100_000];
+const LIGHTS: [u32; 11] = [1, 2, 4, 8, 16, 32, 100, 256, 1_000, 10_000, 100_000];
 
 fn main() -> anyhow::Result<()> {
-    let (mut seconds, mut most) = (1.0, 10_000);
+    let (mut seconds, mut most, mut only) = (1.0, 10_000, None);
     let mut arguments = std::env::args().skip(1);
     while let Some(flag) = arguments.next() {
         let value = arguments.next().with_context(|| format!("{flag} needs a value"))?;
         match flag.as_str() {
             "--seconds" => seconds = value.parse()?,
             "--most" => most = value.parse()?,
+            "--hall" => only = Some(value),
             _ => bail!("{flag} is no flag"),
         }
     }
@@ -32,7 +33,9 @@ fn main() -> anyhow::Result<()> {
         "| hall | lights | error by power | by tree | µs a sample by power | by tree | rays | work by power over tree, time | rays |"
     )?;
     writeln!(out, "| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |")?;
-    for hall in [Hall::Open, Hall::Rooms] {
+    let halls = [Hall::Open, Hall::Rooms, Hall::OneLamp];
+    for hall in halls.into_iter().filter(|hall| only.as_ref().is_none_or(|only| *only == format!("{hall:?}")))
+    {
         for n in LIGHTS.into_iter().filter(|n| *n <= most) {
             writeln!(out, "{}", pool.install(|| row(n, hall, seconds)))?;
         }

@@ -64,7 +64,7 @@ fn main() -> anyhow::Result<()> {
     let rows = look(&cases, &wishes);
     let rows: Vec<(&Case, Vec<Option<Row>>)> = cases.iter().zip(rows).collect();
     let head = format!(
-        "Made by `cargo run --release -p ovtigre-tests --bin stability -- --samples-scale {} -o docs/STABILITY.md`.",
+        "Made by `cargo run -p ovtigre-tests --bin stability -- --samples-scale {} -o docs/STABILITY.md`.",
         wishes.scale
     );
     let text = page(&rows, &head);
