@@ -385,6 +385,11 @@ fn a_list_of_ten_thousand_jobs_is_there_at_once() {
     browser.screenshot("jobs-many");
     browser.press("Newer");
     browser.until("document.querySelector('.where').textContent.startsWith('1–50')");
+    // Sorted by the farm: the first of all, not of those that were shown.
+    browser.press("Job");
+    browser.until("document.querySelector('.jobs-table tbody .named a').textContent === 'copy 1'");
+    browser.press("Job");
+    browser.until("!document.querySelector('.jobs-table tbody .named a').textContent.includes('copy')");
     browser.write("input[type=search]", "copy 777");
     browser.until("document.querySelectorAll('.jobs-table tbody tr').length === 11");
 }

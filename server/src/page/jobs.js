@@ -20,6 +20,9 @@ const COLUMNS = [
   { key: 'created', title: 'Came', by: (job) => Date.parse(job.created_at) },
 ];
 
+/** What the farm sorts the whole list by; by all else the jobs of one page are sorted. */
+const WHOLE = ['name', 'state', 'priority', 'created'];
+
 /** A state as a word with a mark of its own, so that colour is not needed to tell it. */
 export function badge(state) {
   return el('span', { class: `badge ${state}` }, state);
@@ -157,7 +160,9 @@ export async function show(root, { signal }) {
     const button = el('button', { type: 'button', class: 'sort', onclick: () => {
       view.down = view.sort === column.key ? !view.down : false;
       view.sort = view.sort === column.key && !view.down ? null : column.key;
+      view.cursors = [];
       arrange();
+      turn();
     } }, column.title);
     return el('th', { scope: 'col', class: `c-${column.key}` }, button);
   });
@@ -219,7 +224,7 @@ export async function show(root, { signal }) {
 
   function arrange() {
     COLUMNS.forEach((column, i) => heads[i].setAttribute('aria-sort', view.sort !== column.key ? 'none' : view.down ? 'descending' : 'ascending'));
-    const column = COLUMNS.find(({ key }) => key === view.sort);
+    const column = COLUMNS.find(({ key }) => key === view.sort && !WHOLE.includes(key));
     const sorted = [...items];
     if (column) {
       const sign = view.down ? -1 : 1;
@@ -256,7 +261,7 @@ export async function show(root, { signal }) {
         filtered ? null : el('p', {}, el('a', { class: 'button primary', href: '#/new' }, 'Render a scene')));
     }
     const from = view.cursors.length * view.limit;
-    text(where, items.length > 0 ? `${count(from + 1)}–${count(from + items.length)}, the newest first${view.sort ? '; sorted on this page' : ''}` : '');
+    text(where, items.length > 0 ? `${count(from + 1)}–${count(from + items.length)}${WHOLE.includes(view.sort) ? '' : `, the newest first${view.sort ? '; sorted on this page' : ''}`}` : '');
     older.disabled = !next;
     newer.disabled = view.cursors.length === 0;
     if (!performance.getEntriesByName('ovtigre-ready').length) performance.mark('ovtigre-ready');
@@ -267,6 +272,7 @@ export async function show(root, { signal }) {
     const query = new URLSearchParams({ limit: view.limit });
     if (view.state) query.set('state', view.state);
     if (view.text) query.set('text', view.text);
+    if (WHOLE.includes(view.sort)) query.set('sort', `${view.down ? '-' : ''}${view.sort}`);
     if (view.cursors.length) query.set('cursor', view.cursors.at(-1));
     const mine = turning;
     try {
