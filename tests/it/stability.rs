@@ -43,7 +43,7 @@ fn every_case_gives_its_known_answer_but_those_that_are_known_to_fail() {
     let trials: Vec<_> = cases.iter().flat_map(|case| case.trials.iter().map(move |t| (case, t))).collect();
     let faults: Vec<String> = (trials.par_iter())
         .filter_map(|(case, trial)| {
-            let finding = trial.look(Budget { share: SHARE });
+            let finding = trial.look(Budget::even(SHARE));
             let what = format!("{}, {}: {finding:?}", case.name, trial.by);
             match (known(&case.name, &trial.by), finding.verdict()) {
                 (Some([low, high]), _) if (low..=high).contains(&finding.off()) => None,
@@ -90,7 +90,7 @@ fn cheap_cases_find_a_bias_of_a_third_of_a_percent() {
     cheap.par_iter().for_each(|(name, by, share)| {
         let case = cases.iter().find(|case| case.name == *name).expect("a case");
         let trial = case.trials.iter().find(|trial| trial.by == *by).expect("a trial");
-        let finding = trial.look(Budget { share: *share });
+        let finding = trial.look(Budget::even(*share));
         assert_eq!(finding.verdict(), Verdict::Holds, "{name}: {finding:?}");
     });
 }

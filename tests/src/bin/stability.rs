@@ -81,7 +81,7 @@ fn main() -> anyhow::Result<()> {
 /// Looks at all trials, each on one thread, those that take long first.
 #[expect(clippy::print_stderr, reason = "progress of a program")]
 fn look(cases: &[Case], wishes: &Wishes) -> Vec<Vec<Option<Row>>> {
-    let (budget, begun) = (Budget { share: wishes.scale }, Instant::now());
+    let (budget, begun) = (Budget { share: wishes.scale, counts: wishes.scale.max(1.0) }, Instant::now());
     let mut all: Vec<(usize, usize)> =
         cases.iter().enumerate().flat_map(|(c, case)| (0..case.trials.len()).map(move |t| (c, t))).collect();
     // Bidirectional takes longest.
