@@ -37,7 +37,9 @@ impl Trial {
     #[must_use]
     pub fn dearer(self, times: f64) -> Self {
         let Self { by, look } = self;
-        Self::new(by, move |budget: Budget| look(Budget { share: budget.share / times, counts: budget.counts / times }))
+        Self::new(by, move |budget: Budget| {
+            look(Budget { share: budget.share / times, counts: budget.counts / times })
+        })
     }
 
     /// Looks.
