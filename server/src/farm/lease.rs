@@ -20,7 +20,7 @@ use ovtigre_proto::{
     telemetry::span::Place,
 };
 use std::{
-    collections::BTreeSet,
+    collections::{BTreeMap, BTreeSet},
     pin::pin,
     sync::Arc,
     time::{Duration, Instant, SystemTime},
@@ -258,17 +258,23 @@ impl Farm {
         ids: &[LeaseId],
     ) -> Result<Vec<bool>> {
         let mut claimed = Vec::with_capacity(offers.len());
+        // What was read of a job before it was pinned may be put into the book after that: the store's answer counts.
+        let mut pinned: BTreeMap<&JobId, Option<String>> = BTreeMap::new();
         for job in offers.iter().filter(|offer| !offer.pinned).map(|offer| &offer.job) {
-            if self.book().job(job).is_some_and(|entry| entry.wants.class.is_none()) {
+            if !pinned.contains_key(job) {
                 let class = self.store.pin_job(job, &join.instruction_set).await?;
                 if let Some(entry) = self.book().job(job) {
-                    entry.wants.class = class;
+                    entry.wants.class.clone_from(&class);
                 }
+                pinned.insert(job, class);
             }
         }
         let mut claims = Vec::new();
         for (Offer { job, batch, audit, .. }, lease) in offers.iter().zip(ids) {
-            let class = self.book().job(job).and_then(|entry| entry.wants.class.clone());
+            let class = match pinned.get(job) {
+                Some(class) => class.clone(),
+                None => self.book().job(job).and_then(|entry| entry.wants.class.clone()),
+            };
             let right = class.as_ref() == Some(&join.instruction_set);
             claimed.push(right && audit.is_some());
             if right && audit.is_none() {
