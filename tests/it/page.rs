@@ -52,6 +52,7 @@ fn seen(browser: &Browser, view: &str) {
     nothing_serious(browser, view);
     browser.look(390, 844, Scheme::Light);
     browser.screenshot(&format!("{view}-phone"));
+    nothing_serious(browser, view);
     let [wide, window] =
         ["document.documentElement.scrollWidth", "innerWidth"].map(|x| browser.value(x).as_f64().unwrap());
     assert!(wide <= window, "{view} is {wide} wide on a phone of {window}");
