@@ -41,15 +41,21 @@ pub async fn check(store: &dyn Store, blobs: &Blobs) -> Result<Checked> {
         let rows = store.jobs(filter.clone()).await?;
         for row in &rows {
             checked.jobs += 1;
-            if let Err(error) = read_spec(row) {
-                checked.lost.push(format!("job {}: its document cannot be read: {error}", row.id));
+            let mut files = vec![row.scene.clone()];
+            match read_spec(row) {
+                Ok(spec) => files.extend(spec.fetched),
+                Err(error) => {
+                    checked.lost.push(format!("job {}: its document cannot be read: {error}", row.id));
+                }
             }
-            if !scenes.contains_key(&row.scene) {
-                let fault = scene(store, blobs, &row.scene).await?;
-                scenes.insert(row.scene.clone(), fault);
-            }
-            if let Some(Some(fault)) = scenes.get(&row.scene) {
-                checked.lost.push(format!("job {}: its scene {} {fault}", row.id, row.scene));
+            for file in files {
+                if !scenes.contains_key(&file) {
+                    let fault = scene(store, blobs, &file).await?;
+                    scenes.insert(file.clone(), fault);
+                }
+                if let Some(Some(fault)) = scenes.get(&file) {
+                    checked.lost.push(format!("job {}: its scene {file} {fault}", row.id));
+                }
             }
             if row.settled {
                 checked.lost.extend(picture(blobs, row).await?);
