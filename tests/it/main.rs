@@ -21,6 +21,7 @@ mod methods;
 mod motion;
 mod mutate;
 mod page;
+mod page_scene;
 mod photons;
 mod radiosity;
 mod same_bits;
