@@ -22,6 +22,7 @@ mod motion;
 mod mutate;
 mod page;
 mod page_scene;
+mod page_workers;
 mod photons;
 mod radiosity;
 mod same_bits;

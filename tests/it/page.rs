@@ -107,6 +107,7 @@ fn a_job_is_made(browser: &Browser) -> String {
     browser.rewrite("#f-samples", "4096");
     browser.rewrite("#f-error", "0.1");
     browser.until("document.querySelector('.verdict .facts')?.textContent.includes('96 × 54')");
+    browser.until("!document.querySelector('.send button').disabled && document.querySelector('.layer .fault').textContent === ''");
     seen(browser, "new-job");
     browser.press("Render");
     browser.until("document.querySelector('.stage.filled')");
