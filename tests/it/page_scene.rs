@@ -184,6 +184,19 @@ fn a_job_is_left(browser: &Browser, farm: &Farm, job: &str) {
     browser.rewrite("#asked", "1000000");
     browser.press("Draw more");
     browser.until("document.querySelector('.badge').textContent === 'running'");
+    // The plot shows the new target at once, and when it will be met.
+    browser.press("Tighter error");
+    browser.rewrite("#asked", "1.5");
+    browser.press("Set target");
+    browser.until("document.querySelector('.plot').textContent.includes('target 1.50')");
+    browser.until("document.querySelector('.plot text.ahead')?.textContent.startsWith('expected at')");
+    assert!(
+        browser
+            .value("document.querySelector('.plot-space + .hint').textContent.includes('target expected at')")
+            .as_bool()
+            .unwrap()
+    );
+    browser.screenshot("job-expected");
     browser.press("Priority");
     browser.rewrite("#asked", "7");
     browser.press("Set");

@@ -116,6 +116,7 @@ class JobView {
       if (!first) this.loadCurve().catch(() => {});
       if (!first) this.#tell(`It is ${stateOf(job)}.`);
     }
+    if (!first && before.error_target !== job.error_target) this.loadCurve().catch(() => {});
     if (!first && before.workers !== job.workers) this.#tell(`${count(job.workers)} ${job.workers === 1 ? 'worker works' : 'workers work'} at it.`);
     text(this.reason, job.reason === job.state ? '' : job.reason ?? '');
     this.reason.className = `reason ${job.state}`;
