@@ -17,6 +17,7 @@ pub mod ids;
 pub mod join;
 mod keep;
 pub mod lease;
+mod light_groups;
 pub mod live;
 pub mod mandates;
 pub mod needs;

@@ -4,6 +4,7 @@ use super::{
     Farm,
     choice::candidates,
     error::{FarmError, Result, fault},
+    light_groups::{expanded, unknown},
     needs::needs,
     paths::choose,
     reach::{letters, line, missing},
@@ -90,6 +91,7 @@ impl Farm {
                 }
             },
         }
+        let request = expanded(request, &contents).map_err(FarmError::Request)?;
         let candidates = candidates(&request, &contents, &self.rules).map_err(FarmError::Request)?;
         let (mut spec, sketch) = self.chosen_of(candidates, &contents).await?;
         spec.request.webhook = spec.request.webhook.as_ref().map(webhook::shown);
@@ -146,7 +148,7 @@ impl Farm {
         }
         self.need_room()?;
         let webhook = self.webhook(&request)?;
-        let (mut spec, sketch) = self.sketched(request).await?;
+        let (mut spec, sketch) = Box::pin(self.sketched(request)).await?;
         self.has_room_for(owner.as_deref())?;
         self.strip(&mut spec).await?;
         spec.owner = owner;
@@ -249,10 +251,12 @@ pub fn resolve(
     }
     let lit = if request.environment.is_some() { Lit::ByRequest } else { Lit::ByScene };
     let words = language.as_ref().map_or(Letters::NONE, Language::letters);
+    let unnamed = language.as_ref().and_then(|language| unknown(language, &request, scene));
     let unreachable = language
         .map(|language| missing(&language, chosen.method, &request, scene, camera, lens))
         .unwrap_or_default();
     let mut warnings = warnings(scene, lit, camera, samples, replicates);
+    warnings.extend(unnamed);
     warnings.extend(unreachable.iter().map(line));
     let mut spec = JobSpec {
         settings: Settings {
