@@ -69,6 +69,15 @@ pub(super) fn of_jobs(jobs: &[JobId]) -> Query {
     bound(statement, jobs.iter().map(|job| json!([job.as_str()])).collect())
 }
 
+/// Those of these jobs that are not there.
+pub(super) fn not_there(jobs: &[JobId]) -> Query {
+    let statement = over!(
+        [0 job text],
+        "SELECT job FROM item WHERE NOT EXISTS (SELECT 1 FROM job WHERE job.id = item.job)"
+    );
+    bound(statement, jobs.iter().map(|job| json!([job.as_str()])).collect())
+}
+
 /// What is known of a batch before it is handed out.
 struct Claimable {
     state: Option<String>,
