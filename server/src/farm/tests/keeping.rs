@@ -155,6 +155,46 @@ async fn a_file_that_was_being_removed_at_a_crash_is_removed_and_can_be_sent_aga
     assert!(has(&bench.farm, &scene).await);
 }
 
+/// Sends files, and jobs of them, which are then purged; how many jobs were taken, and how many came too late for their file.
+async fn send_and_submit(farm: Arc<Farm>, n: usize) -> (u32, u32) {
+    let (mut taken, mut refused) = (0, 0);
+    for round in 0..25 {
+        // Two send the same file.
+        let mut incoming = farm.receive().await.unwrap();
+        incoming.write(Bytes::from(format!("scene {} {round}", n / 2))).await.unwrap();
+        let scene = match farm.take_in(incoming, None).await {
+            Ok((report, _)) => report.id,
+            Err(FarmError::BeingRemoved(_)) => {
+                refused += 1;
+                continue;
+            }
+            Err(error) => panic!("{error}"),
+        };
+        let request = JobRequest {
+            scene: Some(scene.clone()),
+            size: Some("8x8".parse().unwrap()),
+            samples: Some(4),
+            ..JobRequest::default()
+        };
+        match farm.submit(request, None, None).await {
+            Ok(job) => {
+                for _ in 0..3 {
+                    assert!(has(&farm, &scene).await, "the job's scene is gone");
+                    tokio::task::yield_now().await;
+                }
+                farm.purge(&job.id).await.unwrap();
+                taken += 1;
+            }
+            Err(FarmError::Request(faults)) => {
+                assert!(faults[0].detail.contains("was not uploaded"), "{faults:?}");
+                refused += 1;
+            }
+            Err(error) => panic!("{error}"),
+        }
+    }
+    (taken, refused)
+}
+
 /// Files are sent, jobs of them taken and purged, and what is unused removed, all at the same time and by all farms.
 async fn a_job_always_has_its_files(farms: Vec<Arc<Farm>>) {
     let over = Arc::new(AtomicBool::new(false));
@@ -177,47 +217,7 @@ async fn a_job_always_has_its_files(farms: Vec<Arc<Farm>>) {
             })
         })
         .collect();
-    let sends = (0..8usize).map(|n| {
-        let farm = Arc::clone(&farms[n % farms.len()]);
-        tokio::spawn(async move {
-            let (mut taken, mut refused) = (0, 0);
-            for round in 0..25 {
-                // Two of them send the same file.
-                let mut incoming = farm.receive().await.unwrap();
-                incoming.write(Bytes::from(format!("scene {} {round}", n / 2))).await.unwrap();
-                let scene = match farm.take_in(incoming, None).await {
-                    Ok((report, _)) => report.id,
-                    Err(FarmError::BeingRemoved(_)) => {
-                        refused += 1;
-                        continue;
-                    }
-                    Err(error) => panic!("{error}"),
-                };
-                let request = JobRequest {
-                    scene: Some(scene.clone()),
-                    size: Some("8x8".parse().unwrap()),
-                    samples: Some(4),
-                    ..JobRequest::default()
-                };
-                match farm.submit(request, None, None).await {
-                    Ok(job) => {
-                        for _ in 0..3 {
-                            assert!(has(&farm, &scene).await, "the job's scene is gone");
-                            tokio::task::yield_now().await;
-                        }
-                        farm.purge(&job.id).await.unwrap();
-                        taken += 1;
-                    }
-                    Err(FarmError::Request(faults)) => {
-                        assert!(faults[0].detail.contains("was not uploaded"), "{faults:?}");
-                        refused += 1;
-                    }
-                    Err(error) => panic!("{error}"),
-                }
-            }
-            (taken, refused)
-        })
-    });
+    let sends = (0..8usize).map(|n| tokio::spawn(send_and_submit(Arc::clone(&farms[n % farms.len()]), n)));
     let mut all = (0, 0);
     for (taken, refused) in futures::future::join_all(sends).await.into_iter().map(Result::unwrap) {
         all = (all.0 + taken, all.1 + refused);

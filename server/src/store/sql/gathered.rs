@@ -62,7 +62,8 @@ fn place(job: &impl ToString, at: BatchKey) -> [Value; 4] {
 pub(super) fn of_jobs(jobs: &[JobId]) -> Query {
     let statement = over!(
         [0 job text],
-        "SELECT c.*, (SELECT count(DISTINCT worker) FROM lease WHERE lease.job = item.job) AS workers
+        "SELECT c.look, samples, wall_seconds, worker_seconds, rays, rms_error, relative_error, relative_error_upper,
+           target_expected_at_seconds, doubt, layers, (SELECT count(DISTINCT worker) FROM lease WHERE lease.job = item.job) AS workers
          FROM item LEFT JOIN checkpoint AS c ON c.job = item.job
          AND c.look = (SELECT max(look) FROM checkpoint AS d WHERE d.job = item.job) ORDER BY n"
     );

@@ -1,7 +1,7 @@
 //! Jobs.
 
 use super::{
-    column::{count, from_json, job_state, parse, time, to_json},
+    column::{columns_of, count, from_json, job_state, parse, time, to_json},
     connection::{Db, Row},
     kept,
     merger::require,
@@ -61,14 +61,18 @@ pub(super) async fn add(db: &mut Db, job: NewJob, key: Option<IdempotencyKey>) -
 /// A job.
 pub(super) async fn get(db: &mut Db, id: &JobId) -> Result<Option<JobRow>> {
     let now = db.now().await?;
-    let row = db.first(query("SELECT * FROM job WHERE id = $1").bind(id.as_str())).await?;
+    let row = db
+        .first(query(concat!("SELECT ", columns_of!(job), " FROM job WHERE id = $1")).bind(id.as_str()))
+        .await?;
     row.map(|row| read(&row, now)).transpose()
 }
 
 /// Jobs that are not over or have no last form, the oldest first.
 pub(super) async fn unsettled(db: &mut Db) -> Result<Vec<JobRow>> {
     let now = db.now().await?;
-    let rows = db.all(query("SELECT * FROM job WHERE settled = 0 ORDER BY sequence")).await?;
+    let rows = db
+        .all(query(concat!("SELECT ", columns_of!(job), " FROM job WHERE settled = 0 ORDER BY sequence")))
+        .await?;
     rows.iter().map(|row| read(row, now)).collect()
 }
 

@@ -5,7 +5,7 @@
 //! leading columns are equal to something: what is like the place before comes first, then what is beyond.
 
 use super::{
-    column::{count, from_json, parse},
+    column::{columns_of, count, from_json, parse},
     commit::curve_row,
     connection::Db,
     gathered::{not_there, of_jobs},
@@ -23,7 +23,7 @@ use ovtigre_proto::{id::JobId, status::JobState};
 macro_rules! page {
     ($($condition:literal),+; $($order:literal),+) => {
         concat!(
-            "SELECT * FROM job WHERE ", $($condition,)+ " AND ($3 = '' OR state = $3)
+            "SELECT ", columns_of!(job), " FROM job WHERE ", $($condition,)+ " AND ($3 = '' OR state = $3)
              AND ($2 = '' OR lower(name) LIKE $2 ESCAPE '\\' OR lower(id) LIKE $2 ESCAPE '\\')
              ORDER BY ", $($order,)+ " LIMIT $1"
         )

@@ -511,6 +511,42 @@ mod tests {
     }
 
     #[tokio::test(flavor = "multi_thread")]
+    async fn columns_that_a_newer_program_adds_do_not_disturb_this_one() {
+        let Some(url) = schema("columns").await else { return };
+        let store = Sql::server(&url).await.unwrap();
+        let (worker, job): (WorkerId, JobId) = ("w".parse().unwrap(), "a".parse().unwrap());
+        store.add_worker(&worker, join()).await.unwrap();
+        store.add_job(contract::new_job("a"), None).await.unwrap();
+        let read = async || {
+            assert!(store.job(&job).await.unwrap().is_some());
+            assert_eq!(store.unsettled_jobs().await.unwrap().len(), 1);
+            assert_eq!(store.jobs(JobFilter { limit: 9, ..JobFilter::default() }).await.unwrap().len(), 1);
+            assert_eq!(store.standings(std::slice::from_ref(&job)).await.unwrap().len(), 1);
+            assert!(store.curve(&job).await.unwrap().is_empty());
+            assert_eq!(store.ledger(&job).await.unwrap().cursors.len(), 4);
+            assert!(store.worker(&worker).await.unwrap().is_some());
+            assert_eq!(store.workers(None, 9).await.unwrap().len(), 1);
+            assert!(store.tokens().await.unwrap().is_empty());
+            assert!(store.kept_jobs(9).await.unwrap().is_empty());
+            assert!(store.scene(&BlobId::of([1; 32])).await.unwrap().is_none());
+            assert!(store.due_notices(9, Duration::ZERO).await.unwrap().is_empty());
+        };
+        read().await;
+        let mut db = Source::server(&url).unwrap().connect().await.unwrap();
+        for add in [
+            "ALTER TABLE job ADD COLUMN later TEXT",
+            "ALTER TABLE worker ADD COLUMN later TEXT",
+            "ALTER TABLE token ADD COLUMN later TEXT",
+            "ALTER TABLE checkpoint ADD COLUMN later TEXT",
+            "ALTER TABLE scene ADD COLUMN later TEXT",
+            "ALTER TABLE notice ADD COLUMN later TEXT",
+        ] {
+            db.execute(query::query(add)).await.unwrap();
+        }
+        read().await;
+    }
+
+    #[tokio::test(flavor = "multi_thread")]
     async fn a_server_that_ended_the_connection_is_found_again() {
         let Some(url) = schema("again").await else { return };
         let store = Sql::server(&format!("{url}&application_name=again")).await.unwrap();
