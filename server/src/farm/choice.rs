@@ -10,6 +10,7 @@ use super::{
     submit::resolve,
 };
 use ovtigre_core::{
+    film::sketch::Sketch,
     render::pilot::{Chance, NoPilot, Pilot, Plan, pilot},
     settings::Method,
 };
@@ -58,26 +59,27 @@ pub(super) fn candidates(
 }
 
 impl Farm {
-    /// The job by one of `candidates`, with the reason why.
+    /// The job by one of `candidates`, with the reason why, and the picture of the pilot where there was one.
     pub(super) async fn chosen_of(
         &self,
         mut candidates: Vec<JobSpec>,
         scene: &SceneContents,
-    ) -> Result<JobSpec> {
+    ) -> Result<(JobSpec, Option<Sketch>)> {
         if candidates.len() == 1 {
-            return Ok(candidates.remove(0));
+            return Ok((candidates.remove(0), None));
         }
         let tried = self.pilot(&candidates, scene).await?;
-        let method = tried.as_ref().map_or(candidates[0].settings.method, |pilot| pilot.method);
+        let method = tried.as_ref().map_or(candidates[0].settings.method, |(pilot, _)| pilot.method);
         let mut spec = candidates.swap_remove(
             candidates.iter().position(|spec| spec.settings.method == method).expect("it was tried"),
         );
         spec.method_reason = match &tried {
-            Ok(pilot) => reason(pilot),
+            Ok((pilot, _)) => reason(pilot),
             Err(why) => format!("nothing speaks against it, and {why}"),
         };
-        spec.pilot = tried.ok();
-        Ok(spec)
+        let (pilot, sketch) = tried.ok().unzip();
+        spec.pilot = pilot;
+        Ok((spec, sketch))
     }
 
     /// Tries the candidates for one job, or says why not. Reads the scene whole, as an inspection does.
@@ -85,7 +87,7 @@ impl Farm {
         &self,
         candidates: &[JobSpec],
         scene: &SceneContents,
-    ) -> Result<std::result::Result<Pilot, NoPilot>> {
+    ) -> Result<std::result::Result<(Pilot, Sketch), NoPilot>> {
         let spec = &candidates[0];
         let plan = Plan {
             settings: spec.settings.clone(),

@@ -31,6 +31,7 @@ pub mod reach;
 pub mod reap;
 pub mod rules;
 pub mod scene;
+mod sketches;
 pub mod solution;
 pub mod space;
 pub mod spec;
@@ -86,6 +87,7 @@ pub struct Farm {
     ids: Ids,
     fullness: space::Fullness,
     shown: picture::Shown,
+    sketches: sketches::Sketches,
     tasks: TaskTracker,
     decoders: tokio::sync::Semaphore,
     inspectors: tokio::sync::Semaphore,

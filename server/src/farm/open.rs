@@ -53,6 +53,7 @@ impl Farm {
             inspect,
             fullness: super::space::Fullness::default(),
             shown: super::picture::Shown::default(),
+            sketches: super::sketches::Sketches::default(),
             ids,
             tasks: tokio_util::task::TaskTracker::new(),
             decoders: Semaphore::new(processors),

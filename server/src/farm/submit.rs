@@ -20,7 +20,10 @@ use crate::{
 };
 use ovtigre_core::{
     bsdf::event::Letters,
-    film::size::{Region, Size},
+    film::{
+        size::{Region, Size},
+        sketch::Sketch,
+    },
     path::expression::language::Language,
     render::inspect::{DEFAULT_SKY, by_chance},
     settings::{CameraChoice, Environment, EnvironmentSource, Lens, Settings, Shutter},
@@ -55,6 +58,11 @@ const ASPECT_DEFAULT: f64 = 16.0 / 9.0;
 impl Farm {
     /// Checks a request; what it would become, or all its faults.
     pub async fn check(&self, request: JobRequest) -> Result<JobSpec> {
+        Ok(self.sketched(request).await?.0)
+    }
+
+    /// The same, with a small picture of the job where one was made on the way.
+    async fn sketched(&self, request: JobRequest) -> Result<(JobSpec, Option<Sketch>)> {
         self.webhook(&request)?;
         let scene = request.scene.clone();
         let scene = scene.ok_or_else(|| FarmError::Request(vec![fault("/scene", "'scene' is required")]))?;
@@ -83,9 +91,9 @@ impl Farm {
             },
         }
         let candidates = candidates(&request, &contents, &self.rules).map_err(FarmError::Request)?;
-        let mut spec = self.chosen_of(candidates, &contents).await?;
+        let (mut spec, sketch) = self.chosen_of(candidates, &contents).await?;
         spec.request.webhook = spec.request.webhook.as_ref().map(webhook::shown);
-        Ok(spec)
+        Ok((spec, sketch))
     }
 
     /// Whom to tell of the job's changes.
@@ -134,7 +142,7 @@ impl Farm {
         }
         self.need_room()?;
         let webhook = self.webhook(&request)?;
-        let mut spec = self.check(request).await?;
+        let (mut spec, sketch) = self.sketched(request).await?;
         self.has_room_for(owner.as_deref())?;
         self.strip(&mut spec).await?;
         spec.owner = owner;
@@ -159,6 +167,9 @@ impl Farm {
                 tracing::info!(job = %id, name = row.name, "job taken");
                 let span = self.traces.span("submit", Place::OfJob(&id)).since(came);
                 let _span = span.note("ovtigre.scene", row.scene.to_string());
+                if let Some(sketch) = sketch {
+                    self.sketches.keep(id, sketch);
+                }
                 self.take_up(&row).await?;
                 self.status_of(&row).await
             }
