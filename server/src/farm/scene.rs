@@ -4,6 +4,7 @@ use super::{
     Farm,
     append::blocking,
     error::{FarmError, Result, fault},
+    open::UPLOAD_MAX,
 };
 use crate::{
     blobs::{BlobError, BlobName, Upload},
@@ -109,10 +110,11 @@ impl Farm {
         FailPoint::SceneBeforeBlob.pass();
         incoming.upload.finish(&name).await?;
         FailPoint::SceneAfterBlob.pass();
-        let (content, file) = match self.look_into(&name).await {
+        let (content, file) = match self.look_into(&id).await {
             Ok(found) => found,
             Err(error) => {
-                self.blobs.delete(&name).await?;
+                // Not where somebody else has sent the same, and could read it.
+                self.drop_file(&id, UPLOAD_MAX).await?;
                 return Err(error);
             }
         };
@@ -122,9 +124,13 @@ impl Farm {
         Ok((report, Novelty::New))
     }
 
-    async fn look_into(&self, name: &BlobName) -> Result<(SceneContent, Bytes)> {
+    async fn look_into(&self, id: &BlobId) -> Result<(SceneContent, Bytes)> {
         let _turn = self.inspectors.acquire().await.map_err(|_| FarmError::Stopping)?;
-        let bytes = self.blobs.get(name).await?;
+        let bytes = match self.blobs.get(&BlobName::Scene(id.clone())).await {
+            // Who sent the same at the same time could not read it, and removes it.
+            Err(BlobError::Missing(_)) => return Err(FarmError::BeingRemoved(id.clone())),
+            other => other?,
+        };
         let (inspect, file) = (self.inspect.clone(), bytes.clone());
         let content = blocking(move || (inspect.0)(file)).await?;
         Ok((content.map_err(|fault| FarmError::Scene(vec![fault]))?, bytes))

@@ -87,7 +87,13 @@ pub(super) async fn files_of_jobs_of_earlier_versions_are_found(store: &dyn Stor
     // One that an earlier version adds beside this one.
     with_job(store, "d").await;
     assert_eq!(store.unfiled(2).await.unwrap().len(), 1);
-    assert!(!store.drop_scene(&hash(8), NOW).await.unwrap());
+    store.add_scene(report(4)).await.unwrap();
+    a_moment().await;
+    assert!(!store.drop_scene(&hash(4), NOW).await.unwrap());
+    assert!(
+        store.drop_scene(&hash(8), NOW).await.unwrap(),
+        "without a row no job was ever taken that needs it"
+    );
 }
 
 /// Many jobs and many removals at once, each of which wins somewhere.

@@ -62,7 +62,7 @@ pub trait Store: Send + Sync + fmt::Debug {
     /// Files that no job needs and nobody used for `unused`, `most` of them at most.
     async fn unused_scenes(&self, unused: Duration, most: u32) -> Result<Vec<BlobId>>;
     /// Forgets such a file, or one that it never knew, so that its bytes can be removed: until that is told, nobody adds
-    /// it. False where it is needed or used, or where the files of some job are not known.
+    /// it. False where it is needed or used, or known while the files of some job are not.
     async fn drop_scene(&self, id: &BlobId, unused: Duration) -> Result<bool>;
     /// Whether the bytes of a file are being removed.
     async fn is_dropped(&self, id: &BlobId) -> Result<bool>;

@@ -122,11 +122,13 @@ pub(super) async fn drop_scene(db: &mut Db, id: &BlobId, unused: Duration) -> Re
              WHERE job_file.scene = $1) AS needed",
     );
     let row = db.one(row.bind(id.as_str()).bind(now - millis(unused))).await?;
-    let kept = row.truth("used")? || row.truth("dropped")? || row.truth("needed")?;
-    if kept || !unfiled(db, 1).await?.is_empty() {
+    if row.truth("used")? || row.truth("dropped")? || row.truth("needed")? {
         return Ok(false);
     }
     if row.truth("there")? {
+        if !unfiled(db, 1).await?.is_empty() {
+            return Ok(false);
+        }
         db.execute(query("DELETE FROM scene WHERE id = $1").bind(id.as_str())).await?;
     }
     let dropped = query(
