@@ -9,7 +9,6 @@ use super::{
     spec::JobSpec,
     submit::resolve,
 };
-use crate::blobs::BlobName;
 use ovtigre_core::{
     film::sketch::Sketch,
     render::pilot::{Chance, NoPilot, Pilot, Plan, pilot},
@@ -108,9 +107,9 @@ impl Farm {
         }
         let _turn = self.inspectors.acquire().await.map_err(|_| FarmError::Stopping)?;
         let id = spec.request.scene.clone().expect("checked: a scene is there");
-        let bytes = self.blobs.get(&BlobName::Scene(id)).await?;
+        let bytes = self.upload_bytes("/scene", &id).await?;
         let environment = match &spec.request.environment {
-            Some(EnvironmentRequest::Image(id)) => Some(self.blobs.get(&BlobName::Scene(id.clone())).await?),
+            Some(EnvironmentRequest::Image(id)) => Some(self.upload_bytes("/environment", id).await?),
             Some(EnvironmentRequest::Uniform(_)) | None => None,
         };
         blocking(move || pilot(&bytes[..], environment.as_deref(), &plan)).await

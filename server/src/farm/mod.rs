@@ -15,7 +15,7 @@ pub mod error;
 pub mod extend;
 pub mod ids;
 pub mod join;
-mod keep;
+pub mod keep;
 pub mod lease;
 mod light_groups;
 pub mod live;
@@ -41,6 +41,8 @@ pub mod status;
 pub mod stop;
 mod strip;
 pub mod submit;
+mod sweep;
+mod unused;
 
 #[cfg(test)]
 pub(crate) mod tests;

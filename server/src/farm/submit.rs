@@ -115,12 +115,8 @@ impl Farm {
         }
     }
 
-    async fn upload_at(&self, pointer: &str, id: &BlobId) -> Result<SceneReport> {
-        let row = self.store.scene(id).await?;
-        row.map(|row| row.report).ok_or_else(|| {
-            let detail = format!("'{id}' was not uploaded: PUT its bytes to /v1/scenes/{id} first");
-            FarmError::Request(vec![fault(pointer, detail)])
-        })
+    pub(super) async fn upload_at(&self, pointer: &str, id: &BlobId) -> Result<SceneReport> {
+        self.uploaded(id).await?.ok_or_else(|| not_uploaded(pointer, id))
     }
 
     /// Takes a job of `owner`, a token's id. The same request of one owner under the same key is taken once.
@@ -157,6 +153,7 @@ impl Farm {
         let new = NewJob {
             id: id.clone(),
             name: spec.request.name.clone().unwrap_or_else(|| scene.as_str()[..12].to_owned()),
+            files: spec.files(&scene),
             scene,
             priority: spec.request.priority.unwrap_or(0),
             spec: serde_json::to_string(&spec).map_err(|e| FarmError::Damaged(e.to_string()))?,
@@ -185,9 +182,16 @@ impl Farm {
     async fn taken_before(&self, before: Added) -> Result<JobStatus> {
         match before {
             Added::New | Added::KeyTaken => Err(FarmError::KeyTaken),
+            // It was there when the request was checked.
+            Added::Lacks(file) => Err(not_uploaded("/scene", &file)),
             Added::Before(id) => self.status(&id).await,
         }
     }
+}
+
+pub(super) fn not_uploaded(pointer: &str, id: &BlobId) -> FarmError {
+    let detail = format!("'{id}' was not uploaded: PUT its bytes to /v1/scenes/{id} first");
+    FarmError::Request(vec![fault(pointer, detail)])
 }
 
 /// Whether samples can be split over replicates, and replicates tell an error.
