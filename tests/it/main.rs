@@ -21,6 +21,8 @@ mod methods;
 mod motion;
 mod mutate;
 mod page;
+mod page_scene;
+mod page_workers;
 mod photons;
 mod radiosity;
 mod same_bits;

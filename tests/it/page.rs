@@ -31,7 +31,7 @@ fn lamp() -> Vec<u8> {
 }
 
 /// Nothing that keeps somebody from using the page, and no error of its scripts.
-fn nothing_serious(browser: &Browser, view: &str) {
+pub(crate) fn nothing_serious(browser: &Browser, view: &str) {
     let axe = include_str!("../axe/axe.min.js");
     let check = "return (await axe.run(document, { resultTypes: ['violations'] })).violations
         .map(({ impact, id, nodes }) => [impact, id, nodes.map((node) => `${node.html.slice(0, 200)} ${node.failureSummary}`)]);";
@@ -44,7 +44,7 @@ fn nothing_serious(browser: &Browser, view: &str) {
 }
 
 /// The view as it is on a desk and in a hand, by day and by night.
-fn seen(browser: &Browser, view: &str) {
+pub(crate) fn seen(browser: &Browser, view: &str) {
     browser.screenshot(view);
     nothing_serious(browser, view);
     browser.look(1400, 900, Scheme::Dark);
@@ -59,7 +59,7 @@ fn seen(browser: &Browser, view: &str) {
     browser.look(1400, 900, Scheme::Light);
 }
 
-fn text_of(browser: &Browser, css: &str) -> String {
+pub(crate) fn text_of(browser: &Browser, css: &str) -> String {
     let text = browser.value(&format!("document.querySelector({})?.textContent ?? ''", json!(css)));
     text.as_str().unwrap().to_owned()
 }
@@ -107,6 +107,7 @@ fn a_job_is_made(browser: &Browser) -> String {
     browser.rewrite("#f-samples", "4096");
     browser.rewrite("#f-error", "0.1");
     browser.until("document.querySelector('.verdict .facts')?.textContent.includes('96 × 54')");
+    browser.until("!document.querySelector('.send button').disabled && document.querySelector('.layer .fault').textContent === ''");
     seen(browser, "new-job");
     browser.press("Render");
     browser.until("document.querySelector('.stage.filled')");
@@ -166,19 +167,23 @@ fn pictures_are_compared(browser: &Browser, farm: &Farm) {
     let reference = farm.client(&["submit", ROOM, "--size", "48x27", "--samples", "16"]);
     let reference = reference.trim();
     farm.wait(reference, |job| job["state"] == "done");
-    browser.rewrite(".controls label:nth-of-type(3) select", "job:");
+    browser.press("Job …");
+    browser.rewrite("#asked", "000000000000");
+    browser.press("Compare");
+    browser.until("document.querySelector('.notice.error')?.textContent.includes('no job')");
+    browser.press("Job …");
     browser.rewrite("#asked", reference);
     browser.press("Compare");
     browser.until("document.querySelector('canvas.side.b').width === 48");
     browser.screenshot("job-wipe-reference");
     // The viewer's own drop-downs: what is shown, and what it is compared with.
-    browser.rewrite(".controls label:nth-of-type(3) select", "layer:error");
+    browser.rewrite(".against", "layer:error");
     browser.until("!document.querySelector('.legend').hidden");
     browser.rewrite("input.wipe", "60");
     browser.until("document.querySelector('canvas.side.b').width > 1");
     seen(browser, "job-wipe-error");
     let moment = browser.until("[...document.querySelectorAll('.controls option')].map((o) => o.value).find((v) => v.startsWith('moment:'))");
-    browser.rewrite(".controls label:nth-of-type(3) select", moment.as_str().unwrap());
+    browser.rewrite(".against", moment.as_str().unwrap());
     browser.until("document.querySelector('.legend').hidden");
     browser.screenshot("job-wipe-moment");
     browser.rewrite(".controls label:nth-of-type(1) select", "direct");

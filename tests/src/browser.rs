@@ -5,7 +5,7 @@ use ovtigre_proto::client::tls;
 use serde_json::{Value, json};
 use std::{
     env, fs,
-    path::PathBuf,
+    path::{Path, PathBuf},
     time::{Duration, Instant},
 };
 use tokio::runtime::Runtime;
@@ -150,6 +150,35 @@ impl Browser {
         self.until(&format!("!!{one}"));
         self.run(&format!("document.querySelectorAll('[data-press]').forEach((e) => e.removeAttribute('data-press')); {one}.setAttribute('data-press', '');"), &[]);
         self.click("[data-press]");
+    }
+
+    /// Carries files or folders of this machine over an element, as from another window.
+    pub fn carry(&self, css: &str, files: &[&Path]) {
+        self.drag("dragEnter", css, files);
+        self.drag("dragOver", css, files);
+    }
+
+    /// Carries them there and lets them go.
+    pub fn let_go(&self, css: &str, files: &[&Path]) {
+        self.carry(css, files);
+        self.drag("drop", css, files);
+    }
+
+    fn drag(&self, kind: &str, css: &str, files: &[&Path]) {
+        self.until(&format!("!!document.querySelector({})", json!(css)));
+        let middle = "const e = document.querySelector(a[0]); e.scrollIntoView({ block: 'center' });
+            const b = e.getBoundingClientRect(); return [b.left + b.width / 2, b.top + b.height / 2];";
+        let middle = self.run(middle, &[json!(css)]);
+        let data = json!({"items": [], "files": files, "dragOperationsMask": 1});
+        self.chromium(
+            "Input.dispatchDragEvent",
+            &json!({"type": kind, "x": middle[0], "y": middle[1], "data": data}),
+        );
+    }
+
+    /// Lets the page ask for files without a window of the system's in front of it; a test gives them by [`Self::write`].
+    pub fn without_file_windows(&self) {
+        self.chromium("Page.setInterceptFileChooserDialog", &json!({"enabled": true}));
     }
 
     /// Types into an element; the path of a file for one that takes files.

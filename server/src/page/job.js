@@ -65,7 +65,7 @@ class JobView {
     const lines = [{ time: job.created_at, line: 'The job came.' }];
     if (job.started_at) lines.push({ time: job.started_at, line: 'The first batch was handed out.' });
     for (const row of curve.rows) lines.push({ at: seconds(row.wall_seconds), line: checkpointLine(row) });
-    if (job.ended_at) lines.push({ time: job.ended_at, line: `It was ${job.state}${job.reason ? `: ${job.reason}` : ''}.` });
+    if (job.ended_at) lines.push({ time: job.ended_at, line: `It was ${stateOf(job)}.` });
     this.log = [...this.log, ...lines.reverse()];
     this.#showLog();
   }
@@ -114,10 +114,10 @@ class JobView {
     if (first || before.state !== job.state) {
       fill(this.state, badge(job.state));
       if (!first) this.loadCurve().catch(() => {});
-      if (!first) this.#tell(`It is ${job.state}${job.reason ? `: ${job.reason}` : ''}.`);
+      if (!first) this.#tell(`It is ${stateOf(job)}.`);
     }
     if (!first && before.workers !== job.workers) this.#tell(`${count(job.workers)} ${job.workers === 1 ? 'worker works' : 'workers work'} at it.`);
-    text(this.reason, job.reason ?? '');
+    text(this.reason, job.reason === job.state ? '' : job.reason ?? '');
     this.reason.className = `reason ${job.state}`;
     this.bar.value = part(job);
     this.#fillNumbers();
@@ -157,7 +157,7 @@ class JobView {
       ...job.layers.map((layer) => [`Layer ${layer.name}`, [el('code', {}, layer.shows), layer.error?.relative_error != null ? el('span', { class: 'under' }, `error ${percent(layer.error.relative_error)}`) : null,
         layer.error?.estimated_bias != null ? el('span', { class: 'under' }, `bias about ${percent(layer.error.estimated_bias)}`) : null]]),
       job.request.bounces != null ? ['Bounces', job.request.bounces] : null,
-      job.request.lens_radius ? ['Lens', `radius ${digits(job.request.lens_radius)} m, in focus at ${digits(job.request.focus_distance ?? NaN)} m`] : null,
+      job.request.lens_radius ? ['Lens', `radius ${job.request.lens_radius} m, in focus at ${job.request.focus_distance} m`] : null,
       job.request.shutter ? ['Shutter', `${job.request.shutter.join(' to ')} s`] : null,
       ['Seed', settings.seed],
       ['Stops at', [`${samples(job.samples_asked)} samples`, job.error_target ? `error ${percent(job.error_target)}` : null, job.request.seconds ? seconds(job.request.seconds) : null].filter(Boolean).join(', or ')],
@@ -170,7 +170,7 @@ class JobView {
 
   #fillWhy(first) {
     const { job } = this;
-    const key = JSON.stringify([job.error?.doubt, job.method_reason, job.unreachable, job.warnings, job.radiosity?.certified, job.radiosity?.iterations?.length]);
+    const key = JSON.stringify([job.error?.doubt, job.method_reason, job.unreachable, job.warnings, job.radiosity?.certified, job.radiosity?.iterations?.length, job.needs]);
     if (!first && key === this.whyKey) return;
     this.whyKey = key;
     const lists = [];
@@ -178,7 +178,12 @@ class JobView {
     if (job.unreachable.length > 0) lists.push(el('h3', {}, 'Paths that no technique of this method makes'), el('ul', {}, job.unreachable.map((one) => el('li', {}, said(one)))));
     if (job.warnings.length > 0) lists.push(el('h3', {}, 'Of the scene'), el('ul', {}, job.warnings.map((warning) => el('li', {}, warning))));
     if (job.radiosity) lists.push(el('h3', {}, 'The solution'), el('pre', { tabindex: 0, role: 'region', 'aria-label': 'How radiosity was solved' }, JSON.stringify(job.radiosity, null, 1)));
-    fill(this.why, el('p', {}, el('strong', {}, job.method), `: ${job.method_reason}.`), lists.length > 0 ? lists : el('p', { class: 'hint' }, 'Nothing was left out.'));
+    const { needed, left_out: without } = job.needs;
+    if (needed.length > 0) lists.push(el('h3', {}, 'Needs'), el('p', {}, needed.map((word) => el('span', { class: 'tag' }, word))));
+    if (without.length > 0) lists.push(el('details', { class: 'without' }, el('summary', {}, `Left out: ${count(without.length)} things that it does not need`),
+      el('dl', { class: 'facts' }, without.map(({ what, why }) => [el('dt', {}, what), el('dd', {}, why)]))));
+    fill(this.why, el('p', {}, el('strong', {}, job.method), `: ${job.method_reason}.`),
+      job.unreachable.length > 0 ? null : el('p', { class: 'hint' }, 'It makes all the paths that are asked for.'), lists);
   }
 
   #fillActions() {
@@ -276,6 +281,11 @@ class JobView {
     this.nobody.hidden = here.length > 0;
     this.workers.parentNode.parentNode.hidden = here.length === 0;
   }
+}
+
+/** A job's state with its reason, where that says more. */
+function stateOf({ state, reason }) {
+  return reason && reason !== state ? `${state}: ${reason}` : state;
 }
 
 function checkpointLine(row) {

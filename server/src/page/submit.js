@@ -59,17 +59,11 @@ class Form {
     } });
     this.file = pick({ id: 'choose-file', accept: '.glb,.zip,.gltf', multiple: true });
     this.folder = pick({ id: 'choose-folder', webkitdirectory: true });
-    this.drop = el('section', { class: 'drop', 'aria-label': 'Scene',
-      ondragover: (event) => { event.preventDefault(); this.drop.classList.add('over'); },
-      ondragleave: () => this.drop.classList.remove('over'),
-      ondrop: async (event) => {
-        event.preventDefault();
-        this.drop.classList.remove('over');
-        await this.take(await dropped(event.dataTransfer));
-      } },
+    this.drop = el('section', { class: 'drop', 'aria-label': 'Scene' },
       el('p', {}, el('strong', {}, 'Drop a scene here: '), 'a .glb, a .zip, or a folder with a .gltf'),
       el('div', { class: 'row' }, this.file, el('label', { class: 'button', for: 'choose-file' }, 'Choose a file'), this.folder, el('label', { class: 'button', for: 'choose-folder' }, 'Choose a folder')),
       this.bar, this.told);
+    this.#dropAnywhere();
     this.report = el('section', { class: 'panel', hidden: true, 'aria-label': 'What is in the scene' });
     this.form = el('form', { class: 'wishes', hidden: true, novalidate: true, onsubmit: (event) => { event.preventDefault(); this.submit(); }, oninput: () => this.check() });
     this.verdict = el('section', { class: 'panel verdict', hidden: true, 'aria-label': 'What this would be' });
@@ -77,7 +71,20 @@ class Form {
       el('div', { class: 'split' }, el('div', { class: 'column' }, this.form), el('div', { class: 'column narrow' }, this.report, this.verdict)));
   }
 
-  /** Takes files that were dropped or chosen. */
+  /** What is dropped beside the place for it is taken, too: a browser would leave the page for it. */
+  #dropAnywhere() {
+    const over = (is) => this.drop.classList.toggle('over', is);
+    const listen = (kind, act) => addEventListener(kind, act, { signal: this.signal });
+    listen('dragover', (event) => { event.preventDefault(); over(true); });
+    listen('dragleave', (event) => { if (!event.relatedTarget) over(false); });
+    listen('drop', (event) => {
+      event.preventDefault();
+      over(false);
+      this.take(dropped(event.dataTransfer));
+    });
+  }
+
+  /** Takes files that were dropped or chosen, or a promise of them. */
   async take(files) {
     const tell = (line, part) => {
       text(this.told, line);
@@ -86,7 +93,7 @@ class Form {
     };
     this.told.classList.remove('bad');
     try {
-      const scene = await packed(files);
+      const scene = await packed(await files);
       const report = await bring(scene, tell, this.signal);
       if (report.kind !== 'scene') throw new Error(`${scene.name} is an image: give it as the environment, further down`);
       this.see(report, scene.name);
@@ -160,7 +167,7 @@ class Form {
     fill(this.form,
       group('Picture', el('div', { class: 'grid' },
         this.#field('name', 'Name', line(r.name ?? name?.replace(/\.(glb|gltf|zip)$/i, ''))),
-        this.#field('camera', 'Camera', select(cameras.length > 0 ? cameras.map((title, i) => [i, title || `camera ${i}`]) : [['', 'frames the scene']], r.camera)),
+        this.#field('camera', 'Camera', select(cameras.length > 0 ? cameras.map((title, i) => [i, title || `camera ${i}`]) : [['', 'frames the scene']], cameras.includes(r.camera) ? cameras.indexOf(r.camera) : r.camera)),
         variants.length > 0 ? this.#field('variant', 'Materials', select([['', 'as they are'], ...variants.map((v) => [v, v])], r.variant)) : null,
         this.#field('size', 'Width', number(width || null, { min: 1, step: 1, placeholder: '1280' }), 'pixels'),
         this.#field('height', 'Height', number(height || null, { min: 1, step: 1, placeholder: 'by the camera' }), 'pixels'),
@@ -275,6 +282,10 @@ class Form {
     this.asked = asked;
     let plan = null;
     let problem = null;
+    if (this.#unread()) {
+      this.verdict.hidden = true;
+      return;
+    }
     try {
       plan = await (await send('/v1/jobs?dry_run=true', { method: 'POST', json: this.request(), signal: this.signal })).json();
     } catch (error) {
@@ -286,6 +297,19 @@ class Form {
     this.button.disabled = problem !== null && problem.status === 422;
     this.verdict.hidden = !plan;
     if (plan) this.#plan(plan);
+  }
+
+  /** Whether a field holds what is no number, which would count as nothing; it is said there. */
+  #unread() {
+    const bad = Object.entries(this.fields).filter(([, field]) => field?.validity?.badInput);
+    if (bad.length === 0) return false;
+    this.#fault(null);
+    for (const [key, field] of bad) {
+      text(this.faults[key], 'this is no number');
+      set(field, null, true);
+    }
+    this.button.disabled = true;
+    return true;
   }
 
   #plan(plan) {
@@ -315,6 +339,8 @@ class Form {
       const place = key === 'layers' ? document.getElementById(i === undefined ? 'f-layers-fault' : `layer-${i}-fault`) : this.faults[field];
       text(place ?? this.problem, detail);
       if (this.fields[field]) set(this.fields[field], null, true);
+      const folded = this.fields[field]?.closest('details');
+      if (folded) folded.open = true;
       const at = detail.match(/^character (\d+): /);
       if (at && field === 'paths') this.#mark(this.fields.paths.value, Number(at[1]) - 1);
     }
@@ -327,6 +353,7 @@ class Form {
   }
 
   async submit() {
+    if (this.#unread()) return;
     this.button.disabled = true;
     this.key ??= crypto.randomUUID?.() ?? String(Math.random());
     try {

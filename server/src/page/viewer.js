@@ -2,7 +2,7 @@
 
 import { Problem, Watched, get } from './client.js';
 import { falsely, legend, lightAt } from './colours.js';
-import { asked, el, fill, rested, text } from './dom.js';
+import { asked, el, fill, notice, rested, text } from './dom.js';
 import { digits, plusMinus, samples, seconds } from './format.js';
 
 const MOMENTS_MAX = 16;
@@ -43,6 +43,7 @@ export class Viewer {
   #at = null;
   #moments = [];
   #reference = null;
+  #file = null;
   #signal;
 
   constructor(job, signal) {
@@ -55,7 +56,7 @@ export class Viewer {
 
   #build() {
     this.layers = el('select', { onchange: () => { this.#layer = this.layers.value; this.#errorExposure = null; this.refresh(true); } });
-    this.against = el('select', { onchange: () => this.#choose() });
+    this.against = el('select', { class: 'against', onchange: () => this.#choose() });
     this.exposure = el('input', { type: 'range', min: -10, max: 16, step: 0.25, value: 0, 'aria-label': 'Exposure in stops', oninput: () => this.#expose(Number(this.exposure.value)) });
     this.stops = el('output', { class: 'stops' }, '0 EV');
     this.wipe = el('input', { type: 'range', min: 0, max: 100, value: 50, class: 'wipe', hidden: true, 'aria-label': 'Where the two pictures meet, in percent', oninput: () => { this.#wipe = Number(this.wipe.value); this.#place(); } });
@@ -77,11 +78,12 @@ export class Viewer {
       el('div', { class: 'controls' },
         el('label', {}, el('span', {}, 'Show'), this.layers),
         el('label', { class: 'grow' }, el('span', {}, 'Exposure'), this.exposure, this.stops),
-        el('label', {}, el('span', {}, 'Against'), this.against), this.file,
+        el('div', { class: 'row tight' }, el('label', {}, el('span', {}, 'Against'), this.against),
+          button('Job …', 'Job … to compare with', () => this.#askForJob()), button('File …', 'File … of this machine to compare with', () => this.file.click()), this.file),
         el('div', { class: 'row tight', role: 'group', 'aria-label': 'Zoom' },
           button('−', 'Zoom out', () => this.#zoomAt(this.#zoom / 2)), this.level, button('+', 'Zoom in', () => this.#zoomAt(this.#zoom * 2)), button('Fit', 'Fit the picture', () => this.#zoomAt(1)))),
       this.stage, this.wipe, this.legend, this.readOut,
-      el('p', { class: 'hint', id: 'stage-keys' }, 'Arrows move the mark (with Shift by ten), + − 0 zoom, [ ] exposure, drag to move, double click for pixels. ', this.version));
+      el('p', { class: 'hint', id: 'stage-keys' }, 'Arrows move the mark (with Shift by ten), +\u00a0−\u00a00 zoom, [\u00a0] exposure, drag to move, double click for pixels. ', this.version));
     legend(this.legend.appendChild(el('canvas', { width: 256, height: 8, 'aria-hidden': 'true' })));
     this.scaleText = this.legend.appendChild(el('span'));
   }
@@ -97,7 +99,9 @@ export class Viewer {
     fill(this.against, el('option', { value: 'none' }, 'nothing'),
       el('optgroup', { label: 'This picture' }, [...planes, ...errors].map(option('layer:', kept))),
       this.#moments.length > 0 ? el('optgroup', { label: 'How it was' }, this.#moments.map((moment, i) => el('option', { value: `moment:${moment.key}`, selected: kept === `moment:${moment.key}` }, `${samples(moment.samples)} samples, ${seconds(moment.at)}`))) : null,
-      el('optgroup', { label: 'A reference' }, el('option', { value: 'job:', selected: kept.startsWith('job:') }, 'another job …'), el('option', { value: 'file:', selected: kept === 'file:' }, 'a picture on this machine …')));
+      this.#reference || this.#file ? el('optgroup', { label: 'A reference' },
+        this.#reference ? el('option', { value: 'job:', selected: kept === 'job:' }, `job ${this.#reference}`) : null,
+        this.#file ? el('option', { value: 'file:', selected: kept === 'file:' }, this.#file.name) : null) : null);
     if (kept !== 'none' && ![...this.against.options].some((o) => o.selected && o.value !== 'none')) this.#against = 'none';
   }
 
@@ -144,7 +148,7 @@ export class Viewer {
         this.#again = false;
         await this.#fetch(this.#a, this.#layer);
         if (this.#against.startsWith('layer:')) await this.#fetch(this.#b, this.#against.slice(6));
-        if (this.#against.startsWith('job:') && this.#reference) await this.#fetch(this.#b, 'picture', this.#reference);
+        if (this.#against === 'job:') await this.#fetch(this.#b, 'picture', this.#reference);
       } while (this.#again && !this.#signal.aborted);
     } catch (error) {
       if (error.name === 'AbortError') return;
@@ -158,9 +162,12 @@ export class Viewer {
   }
 
   async #fetch(side, layer, job) {
+    const against = this.#against;
     const response = await side.watched.get(this.#address(layer, job), { signal: this.#signal });
     if (!response) return;
     const blob = await response.blob();
+    // Something else may be compared with by now.
+    if (side === this.#b && against !== this.#against) return;
     const preview = response.headers.get('ovtigre-preview');
     await side.draw(blob, this.#isError(layer));
     this.message.hidden = true;
@@ -206,33 +213,54 @@ export class Viewer {
 
   #soon = rested(() => this.refresh(true), 120);
 
-  async #choose() {
+  #choose() {
     this.#against = this.against.value;
-    this.#b.watched.forget();
-    const [kind, name] = [this.#against.split(':')[0], this.#against.slice(this.#against.indexOf(':') + 1)];
-    if (kind === 'file') this.file.click();
-    if (kind === 'moment') await this.#b.draw(this.#moments.find((moment) => String(moment.key) === name).blob, false);
-    if (kind === 'job') {
-      this.#reference = (await asked('Id of the job to compare with', 'Compare', { value: this.#reference ?? '', required: true }))?.trim() || null;
-      if (!this.#reference) this.#against = 'none';
-      this.#options();
+    return this.#compare();
+  }
+
+  async #askForJob() {
+    const id = (await asked('Id of the job to compare with', 'Compare', { value: this.#reference ?? '', required: true }))?.trim();
+    if (!id) return;
+    try {
+      await get(`/v1/jobs/${encodeURIComponent(id)}`, { signal: this.#signal });
+    } catch (error) {
+      notice(error.message, 'error');
+      return;
     }
-    this.wipe.hidden = this.#against === 'none';
+    this.#reference = id;
+    this.#against = 'job:';
+    this.#options();
+    await this.#compare();
+  }
+
+  /** A picture of this machine was chosen. */
+  async #refer() {
+    const [file] = this.file.files;
+    // So that the same file can be chosen again.
+    this.file.value = '';
+    if (!file) return;
+    try {
+      (await createImageBitmap(file)).close();
+    } catch {
+      notice(`${file.name} is no picture that a browser reads: a PNG, JPEG or WebP is needed.`, 'error');
+      return;
+    }
+    this.#file = file;
+    this.#against = 'file:';
+    this.#options();
+    await this.#compare();
+  }
+
+  /** Shows what is compared with now. */
+  async #compare() {
+    const [kind, name] = [this.#against.split(':')[0], this.#against.slice(this.#against.indexOf(':') + 1)];
+    this.#b.watched.forget();
+    if (kind === 'file') await this.#b.draw(this.#file, false);
+    if (kind === 'moment') await this.#b.draw(this.#moments.find((moment) => String(moment.key) === name).blob, false);
+    this.wipe.hidden = kind === 'none';
     this.#place();
     await this.refresh();
     this.#scale();
-  }
-
-  async #refer() {
-    const [file] = this.file.files;
-    if (!file) return;
-    try {
-      await this.#b.draw(file, false);
-    } catch {
-      text(this.message, 'This file is no picture that a browser reads: a PNG, JPEG or WebP is needed.');
-      this.message.hidden = false;
-    }
-    this.#place();
   }
 
   /** Places the canvases: the region fits the stage at zoom 1. */

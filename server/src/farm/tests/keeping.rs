@@ -299,7 +299,9 @@ async fn orphans_are_swept_at_start_and_what_is_in_use_stays() {
         fs::create_dir_all(path.parent().unwrap()).unwrap();
         fs::write(path, "half").unwrap();
     }
-    staged.iter().for_each(|path| age(path, Duration::from_secs(60)));
+    for path in &staged {
+        age(path, Duration::from_mins(1));
+    }
     let kept = (bench.paths(&going), bench.files(&over));
     assert!(!kept.0.is_empty());
 
