@@ -16,6 +16,8 @@ use serde::{Deserialize, Serialize};
 pub const SAMPLES_DEFAULT: u32 = 256;
 /// Replicates where a job does not say.
 pub const REPLICATES_DEFAULT: u32 = 4;
+/// What stands among a job's layers for one of each light.
+pub const LAYER_OF_EACH_LIGHT: &str = "lights";
 /// Width of a picture where a job does not say; the height follows from the camera.
 pub const WIDTH_DEFAULT: u32 = 1280;
 
@@ -58,7 +60,7 @@ pub struct JobRequest {
     /// How light is estimated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub method: Option<MethodRequest>,
-    /// Further pictures, `NAME=EXPR` each.
+    /// Further pictures, `NAME=EXPR` each; `lights` is one for each light that has a name.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub layers: Vec<String>,
     /// Only these techniques of `bidirectional`: pairs `s,t` of light and eye vertices, with `;` between.

@@ -73,6 +73,12 @@ pub struct SceneContents {
     pub variants: Vec<String>,
     /// Emitters of each kind.
     pub lights: LightCounts,
+    /// Names by which expressions take its lights (`L'name'`): those of their nodes and of their materials.
+    #[serde(default)]
+    pub light_names: Option<Vec<String>>,
+    /// Of those, one for each light that has any.
+    #[serde(default)]
+    pub light_groups: Option<Vec<String>>,
     /// Whether each camera's rays are parallel.
     #[serde(default)]
     pub camera_rays_parallel: Vec<bool>,

@@ -1,6 +1,7 @@
 //! Scenes, partials, sums and results over an object store.
 
 mod bucket;
+mod staged;
 
 use crate::store::row::{BatchKey, Lane};
 use bytes::Bytes;
@@ -13,9 +14,10 @@ use object_store::{
 };
 use ovtigre_proto::id::{BlobId, JobId, LeaseId};
 use std::{
+    collections::BTreeMap,
     fmt, io,
     ops::Range,
-    path::Path,
+    path::{Path, PathBuf},
     sync::Arc,
     time::{Duration, SystemTime},
 };
@@ -136,10 +138,21 @@ impl From<object_store::Error> for BlobError {
 
 type Result<T> = std::result::Result<T, BlobError>;
 
+/// Whether there are sums of a job: partials or prefixes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Sums {
+    /// There are none.
+    None,
+    /// There are some.
+    Some,
+}
+
 /// Where blobs are kept. A blob is there whole or not at all, and durable once it was put.
 #[derive(Clone, Debug)]
 pub struct Blobs {
     store: Arc<dyn ObjectStore>,
+    /// Where they are, if that is in a folder.
+    folder: Option<PathBuf>,
     signer: Option<Arc<dyn Signer>>,
     prefix: Key,
 }
@@ -152,14 +165,19 @@ impl Blobs {
             BlobError::Failed(object_store::Error::Generic { store: "folder", source: e.into() })
         })?;
         let store = LocalFileSystem::new_with_prefix(path)?.with_fsync(true).with_automatic_cleanup(true);
-        Ok(Self { store: Arc::new(store), signer: None, prefix: Key::default() })
+        Ok(Self {
+            store: Arc::new(store),
+            folder: Some(path.to_owned()),
+            signer: None,
+            prefix: Key::default(),
+        })
     }
 
     /// In a bucket of an S3-compatible service, `s3://bucket/prefix`.
     pub fn bucket(url: &str) -> Result<Self> {
         let (store, prefix) = bucket::open(url)?;
         let store = Arc::new(store);
-        Ok(Self { store: store.clone(), signer: Some(store), prefix })
+        Ok(Self { store: store.clone(), folder: None, signer: Some(store), prefix })
     }
 
     fn key(&self, name: &impl fmt::Display) -> Key {
@@ -257,6 +275,27 @@ impl Blobs {
         Ok(())
     }
 
+    /// Bytes of a job's files, without partials: those of a job that is settled are about to go.
+    pub async fn bytes_of(&self, job: &JobId) -> Result<u64> {
+        let partials = self.key(&BlobFolder::Partials(job.clone()));
+        let listed = self.store.list(Some(&self.key(&BlobFolder::Job(job.clone()))));
+        let kept =
+            listed.try_filter(move |meta| std::future::ready(!meta.location.prefix_matches(&partials)));
+        Ok(kept.try_fold(0, async |sum, meta| Ok(sum + meta.size)).await?)
+    }
+
+    /// Uploaded files that were put longer ago than `age`.
+    pub async fn scenes_older(&self, age: Duration) -> Result<Vec<BlobId>> {
+        let now = SystemTime::now();
+        let listed = self.store.list(Some(&self.key(&"scenes")));
+        let old = listed.try_filter_map(|meta| {
+            let time = now.duration_since(SystemTime::from(meta.last_modified)).unwrap_or_default();
+            let id = meta.location.filename().and_then(|name| name.parse().ok()).filter(|_| time >= age);
+            std::future::ready(Ok(id))
+        });
+        Ok(old.try_collect().await?)
+    }
+
     /// Parts of a file that are there, by where they begin.
     pub async fn parts(&self, id: &BlobId) -> Result<Vec<(u64, u64)>> {
         let folder = self.key(&BlobFolder::Parts(id.clone()));
@@ -270,11 +309,18 @@ impl Blobs {
         Ok(parts)
     }
 
-    /// Jobs that have blobs.
-    pub async fn jobs(&self) -> Result<Vec<JobId>> {
-        let listed = self.store.list_with_delimiter(Some(&self.key(&"jobs"))).await?;
-        let names = listed.common_prefixes.iter().filter_map(|key| key.filename());
-        Ok(names.filter_map(|name| name.parse().ok()).collect())
+    /// Jobs that have blobs, and whether some of them are sums.
+    pub async fn jobs(&self) -> Result<BTreeMap<JobId, Sums>> {
+        let folder = self.key(&"jobs");
+        let mut listed = self.store.list(Some(&folder));
+        let mut jobs = BTreeMap::new();
+        while let Some(meta) = listed.try_next().await? {
+            let Some(mut parts) = meta.location.prefix_match(&folder) else { continue };
+            let Some(Ok(job)) = parts.next().map(|part| part.as_ref().parse::<JobId>()) else { continue };
+            let sums = if parts.count() > 1 { Sums::Some } else { Sums::None };
+            jobs.entry(job).and_modify(|before: &mut Sums| *before = sums.max(*before)).or_insert(sums);
+        }
+        Ok(jobs)
     }
 
     /// Gives a blob another name; one that has it is replaced.
@@ -355,7 +401,8 @@ mod tests {
         blobs.put_once(&handed, Bytes::from_static(b"a sum")).await.unwrap();
         blobs.rename(&handed, &BlobName::Result(job.clone(), "m".repeat(64))).await.unwrap();
         assert!(matches!(blobs.size(&handed).await, Err(BlobError::Missing(_))));
-        assert_eq!(blobs.jobs().await.unwrap(), std::slice::from_ref(&job));
+        assert_eq!(blobs.jobs().await.unwrap(), BTreeMap::from([(job.clone(), Sums::Some)]));
+        assert_eq!(blobs.bytes_of(&job).await.unwrap(), 6 + 5);
         blobs.delete_all(&BlobFolder::Partials(job.clone())).await.unwrap();
         assert_eq!(blobs.size(&name).await.unwrap(), 6);
         blobs.delete_all(&BlobFolder::Job(job)).await.unwrap();

@@ -12,6 +12,8 @@ use ovtigre_proto::{
 };
 use std::sync::Arc;
 
+/// Names of lights that a report has, at most.
+const NAMES_MAX: usize = 1000;
 const EXR: &[u8] = &[0x76, 0x2f, 0x31, 0x01];
 const RADIANCE: &[u8] = b"#?";
 
@@ -36,7 +38,18 @@ fn at_fault(error: &LoadError) -> Fault {
 /// In the words of the wire.
 pub fn contents(found: Contents) -> SceneContents {
     let [point, spot, directional] = found.punctual;
-    let Contents { report, aspects, parallel, letters, brightest, needs, leaves_out, warnings, .. } = found;
+    let Contents {
+        report,
+        light_names: names,
+        aspects,
+        parallel,
+        letters,
+        brightest,
+        needs,
+        leaves_out,
+        warnings,
+        ..
+    } = found;
     let aspects: Vec<Option<f64>> = aspects.into_iter().map(|a| a.map(f64::from)).collect();
     SceneContents {
         triangles: report.placed_triangles,
@@ -51,6 +64,8 @@ pub fn contents(found: Contents) -> SceneContents {
         aspect_ratio: aspects.first().copied().flatten(),
         camera_aspect_ratios: aspects,
         lights: LightCounts { emissive_triangles: report.emissive_triangles, point, spot, directional },
+        light_names: Some(names.all.into_iter().take(NAMES_MAX).collect()),
+        light_groups: Some(names.groups.into_iter().take(NAMES_MAX).collect()),
         camera_rays_parallel: parallel,
         letters: letters.iter().map(|letter| letter.symbol().to_owned()).collect(),
         brightest,

@@ -1,5 +1,5 @@
 //! How much one server takes: many workers over real HTTP that bring made-up sums of 8×8 pixels, at a steady rate of exchanges;
-//! then a long list of jobs, page by page.
+//! then a long list of jobs that are over, page by page, in two orders, with their checkpoints.
 //!
 //! `./tests/services cargo bench -p ovtigre-tests --bench load -- [WORKERS [SECONDS [EXCHANGES A SECOND [JOBS LISTED]]]]`, with
 //! 1000, 60, 600 and 100000 where nothing is said; over a file and, where `tests/services` has started it, over PostgreSQL.
@@ -60,6 +60,7 @@ impl Times {
 struct Measured {
     exchanges: Times,
     sums: Times,
+    leases: AtomicU64,
     failed: AtomicU64,
     late: AtomicU64,
 }
@@ -110,6 +111,7 @@ async fn work(client: Client, load: Load, number: usize, begin: Instant, measure
         match client.exchange(&id, &Exchange { holding, wants: 1, ..Exchange::default() }).await {
             Ok(reply) => {
                 measured.exchanges.add(since);
+                measured.leases.fetch_add(reply.leases.len() as u64, Ordering::Relaxed);
                 held.extend(reply.leases);
             }
             Err(_) => drop(measured.failed.fetch_add(1, Ordering::Relaxed)),
@@ -164,6 +166,7 @@ async fn bear(farm: &Farm, load: Load, scene: &Path, client: &Client) {
             "  {what}: {rate:.0}/s; half in {half:.1} ms, 99 % in {most:.1} ms, all in {all:.0} ms"
         ));
     }
+    print(&format!("  leases handed out: {:.0}/s", measured.leases.load(Ordering::Relaxed) as f64 / seconds));
     let exchanges = measured.exchanges.summary().0 as f64;
     let (failed, late) = (measured.failed.load(Ordering::Relaxed), measured.late.load(Ordering::Relaxed));
     print(&format!(
@@ -177,41 +180,57 @@ async fn bear(farm: &Farm, load: Load, scene: &Path, client: &Client) {
 /// Copies of one job that is over, as rows of the database.
 async fn copy_jobs(database: Result<&str, &Path>, load: Load) {
     let columns = "name, scene, state, reason, version, priority, created_ms, started_ms, ended_ms, paused_ms, spec, progress, certified, manifest, settled";
-    let one = "(SELECT * FROM job WHERE settled = 1 LIMIT 1)";
+    let looks = "look, samples, wall_seconds, worker_seconds, rays, rms_error, relative_error, relative_error_upper, layers";
+    // One with checkpoints, where there is one.
+    let one = "SELECT id FROM job WHERE settled = 1 ORDER BY (SELECT count(*) FROM checkpoint WHERE job = job.id) DESC, sequence LIMIT 1";
     let listed = load.listed;
-    match database {
-        Ok(url) => {
-            let copy = format!(
-                "INSERT INTO job (id, {columns}) SELECT 'c' || n, {columns} FROM {one} AS one, generate_series(1, {listed}) AS n"
-            );
-            let mut db = PgConnection::connect(url).await.unwrap();
-            sqlx::query(AssertSqlSafe(copy)).execute(&mut db).await.unwrap();
-        }
-        Err(file) => {
-            let copy = format!(
-                "WITH RECURSIVE n(n) AS (SELECT 1 UNION ALL SELECT n + 1 FROM n WHERE n < {listed})
-                 INSERT INTO job (id, {columns}) SELECT 'c' || n, {columns} FROM {one}, n"
-            );
-            let mut db = SqliteConnection::connect(file.to_str().unwrap()).await.unwrap();
-            sqlx::query(AssertSqlSafe(copy)).execute(&mut db).await.unwrap();
+    let copies = [
+        format!(
+            "INSERT INTO job (id, {columns}) SELECT 'c' || n, {columns} FROM n, (SELECT * FROM job WHERE id = ({one})) AS one"
+        ),
+        format!(
+            "INSERT INTO checkpoint (job, {looks}) SELECT 'c' || n, {looks} FROM n, checkpoint WHERE job = ({one})"
+        ),
+        format!(
+            "INSERT INTO job_file (job, scene) SELECT 'c' || n, scene FROM n, job_file WHERE job = ({one})"
+        ),
+    ];
+    for copy in copies {
+        match database {
+            Ok(url) => {
+                let numbers = format!("WITH n(n) AS (SELECT generate_series(1, {listed})) ");
+                let mut db = PgConnection::connect(url).await.unwrap();
+                sqlx::query(AssertSqlSafe(numbers + &copy)).execute(&mut db).await.unwrap();
+            }
+            Err(file) => {
+                let numbers = format!(
+                    "WITH RECURSIVE n(n) AS (SELECT 1 UNION ALL SELECT n + 1 FROM n WHERE n < {listed}) "
+                );
+                let mut db = SqliteConnection::connect(file.to_str().unwrap()).await.unwrap();
+                sqlx::query(AssertSqlSafe(numbers + &copy)).execute(&mut db).await.unwrap();
+            }
         }
     }
 }
 
-async fn list(farm: &Farm, client: &Client, what: &str) {
+/// Pages of 50 jobs each, from the first to the last, in the order of `sort`.
+async fn list(farm: &Farm, sort: &str) {
     let times = Times::default();
-    let mut pages = client.jobs(None);
-    let mut jobs = 0;
+    let client = reqwest::Client::new();
+    let (mut cursor, mut jobs) = (String::new(), 0);
     loop {
         let since = Instant::now();
-        let Some(page) = pages.next().await.unwrap() else { break };
+        let page = format!("{}/v1/jobs?limit=50&sort={sort}{cursor}", farm.url);
+        let page: serde_json::Value = client.get(page).send().await.unwrap().json().await.unwrap();
         times.add(since);
-        jobs += page.len();
+        jobs += page["items"].as_array().unwrap().len();
+        let Some(next) = page["next"].as_str() else { break };
+        cursor = format!("&cursor={next}");
     }
     let (pages, [half, most, all]) = times.summary();
     let memory = farm.cost().1 >> 20;
     print(&format!(
-        "  {jobs} jobs listed{what} in {pages} pages; half in {half:.1} ms, 99 % in {most:.1} ms, all in {all:.0} ms; memory at most {memory} MiB"
+        "  {jobs} jobs listed by {sort} in {pages} pages; half in {half:.1} ms, 99 % in {most:.1} ms, all in {all:.0} ms; memory at most {memory} MiB"
     ));
 }
 
@@ -239,9 +258,12 @@ async fn measure(name: &str, place: &Path, flags: &[&str], database: Option<&str
     farm.kill();
     let file = place.join("farm.sqlite");
     copy_jobs(database.ok_or(&file), load).await;
+    let since = Instant::now();
     let farm = Farm::start_with(place, flags);
-    let client = Client::new(&farm.url, 1).unwrap();
-    list(&farm, &client, "").await;
+    print(&format!("  started over {} jobs in {:.1} s", load.listed, since.elapsed().as_secs_f64()));
+    for sort in ["-created", "name"] {
+        list(&farm, sort).await;
+    }
 }
 
 #[tokio::main]

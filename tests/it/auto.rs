@@ -6,7 +6,7 @@ use ovtigre_core::{
 };
 use ovtigre_tests::{
     picture::settings,
-    program::run,
+    program::{Farm, run},
     scenes::cornell,
     showcase::{caustic, lamp_behind_glass},
 };
@@ -26,7 +26,7 @@ fn plan_of([width, height]: [u32; 2], methods: &[Method], samples: u32) -> Plan 
 
 fn tried(glb: &[u8], plan: &Plan, threads: usize) -> Pilot {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-    pool.install(|| pilot(glb, None, plan)).unwrap()
+    pool.install(|| pilot(glb, None, plan)).unwrap().0
 }
 
 const ALL: [Method; 3] = [Method::Path, Method::Bidirectional, Method::Light];
@@ -100,4 +100,47 @@ fn what_is_chosen_is_what_asking_for_it_gives() {
     let compared =
         run(["compare".as_ref(), a.as_os_str(), b.as_os_str(), "--tolerance".as_ref(), "0".as_ref()]);
     assert!(compared.status.success(), "{}", String::from_utf8_lossy(&compared.stdout));
+}
+
+/// What a job's picture is now: the status of the answer, the size that a preview was made in, and the PNG.
+async fn seen(farm: &Farm, id: &str, query: &str) -> (u16, Option<String>, Vec<u8>) {
+    let answer = reqwest::get(format!("{}/v1/jobs/{id}/{query}", farm.url)).await.unwrap();
+    let preview = answer.headers().get("ovtigre-preview").map(|size| size.to_str().unwrap().to_owned());
+    (answer.status().as_u16(), preview, answer.bytes().await.unwrap().to_vec())
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_pilot_is_seen_before_the_first_samples() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = folder.path().join("scene.glb");
+    fs::write(&scene, cornell()).unwrap();
+    let farm = Farm::start(&folder.path().join("data"));
+    let asked = ["submit", scene.to_str().unwrap(), "--size", "96x96", "--samples", "64"];
+    let id = tokio::task::block_in_place(|| farm.client(&asked)).trim().to_owned();
+    let job = tokio::task::block_in_place(|| farm.job(&id));
+    let size = &job["pilot"]["size"];
+    let size = format!("{}x{}", size["width"], size["height"]);
+    let (status, preview, png) = seen(&farm, &id, "image.png").await;
+    assert_eq!((status, preview.as_deref()), (200, Some(&*size)));
+    let preview = image::load_from_memory(&png).unwrap().to_rgb8();
+    assert_eq!(preview.dimensions(), (96, 96));
+    assert_eq!(seen(&farm, &id, "image.exr").await.0, 404, "a preview is no result");
+    assert_eq!(seen(&farm, &id, "image.png?layer=error").await.0, 404, "its error is not that of the job");
+
+    let worker = tokio::task::block_in_place(|| farm.worker());
+    tokio::task::block_in_place(|| farm.wait(&id, |job| job["state"] == "done"));
+    drop(worker);
+    let (status, none, png) = seen(&farm, &id, "image.png").await;
+    assert_eq!((status, none), (200, None));
+    let picture = image::load_from_memory(&png).unwrap().to_rgb8();
+    // Both show the same: in blocks of 24 pixels, which are three of the preview's, what is red on the left is red, and green is on the right.
+    let block = |image: &image::RgbImage, x: u32| {
+        let all = (0..24 * 24).map(|i| image.get_pixel(x + i % 24, 36 + i / 24).0);
+        all.fold([0_u32; 3], |sum, pixel| [0, 1, 2].map(|c| sum[c] + u32::from(pixel[c])))
+            .map(|sum| sum / 576)
+    };
+    for x in [0, 36, 72] {
+        let (a, b) = (block(&preview, x), block(&picture, x));
+        assert!(a.iter().zip(b).all(|(a, b)| a.abs_diff(b) < 12), "at {x}: {a:?} and {b:?}");
+    }
 }

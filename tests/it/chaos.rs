@@ -64,6 +64,7 @@ struct Survived {
     servers_killed: u32,
     workers_killed: u32,
     folders_taken: u32,
+    connections_ended: i64,
     lines: u64,
 }
 
@@ -75,6 +76,9 @@ struct Chaos<'a> {
     clocks: [Vec<(String, String)>; 2],
     /// The folder of its files, where it has one.
     files: Option<&'a Path>,
+    /// The database and the bucket, where those are elsewhere.
+    shared: Option<&'a Shared>,
+    runtime: tokio::runtime::Runtime,
     random: Random,
     survived: Survived,
 }
@@ -115,6 +119,9 @@ impl Chaos<'_> {
                 if let Some(files) = self.files {
                     take_away(&files.join("jobs"), Duration::from_millis(self.random.draw() % 400));
                     self.survived.folders_taken += 1;
+                }
+                if let Some(shared) = self.shared {
+                    self.survived.connections_ended += shared.end_connections(&self.runtime);
                 }
             }
         }
@@ -158,6 +165,8 @@ fn assert_survives(name: &str, servers: usize, shared: Option<&Shared>) {
         workers: Vec::new(),
         clocks: [clock(1), clock(-1)],
         files: shared.is_none().then_some(&*files),
+        shared,
+        runtime: tokio::runtime::Runtime::new().unwrap(),
         random: Random::new(seed),
         survived: Survived::default(),
     };

@@ -2,7 +2,9 @@
 
 use glam::{DVec3, Vec3};
 use ovtigre_core::{
+    gltf::limits::Limits,
     path::expression::presets::preset,
+    render::inspect::inspect,
     settings::{FULL, Layer, Method, Settings, Shadows, Shows},
 };
 use ovtigre_tests::{
@@ -173,7 +175,10 @@ fn no_pixel_is_darker_without_shadows() {
 #[test]
 fn lights_by_their_names_make_up_the_picture() {
     let glb = lecture();
-    let layers = ["L'lamp'DE", "L'point'DE"].map(str::to_owned);
+    let names = inspect(&glb[..], &Limits::default()).unwrap().light_names;
+    assert_eq!(names.groups.iter().collect::<Vec<_>>(), ["lamp", "point"]);
+    assert!(names.all.is_superset(&names.groups));
+    let layers: Vec<String> = names.groups.iter().map(|name| format!("L'{name}'DE")).collect();
     let photon = (Method::Photon, 2);
     for (method, samples) in [(Method::Path, 16), (Method::Light, 64), (Method::Bidirectional, 16), photon] {
         let picture = rendered(&glb, &small(method, "LDE", &layers), samples);

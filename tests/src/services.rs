@@ -8,6 +8,8 @@ use std::env;
 pub struct Shared {
     database: String,
     blobs: String,
+    /// Of the schema, of the folder in the bucket, and of connections.
+    name: String,
 }
 
 impl Shared {
@@ -29,13 +31,26 @@ impl Shared {
             connection.close().await.expect("the server is there");
         });
         let mark = if server.contains('?') { '&' } else { '?' };
-        let database = format!("{server}{mark}options=-csearch_path%3D{name}");
-        Some(Self { database, blobs: format!("{bucket}/{name}") })
+        let database = format!("{server}{mark}options=-csearch_path%3D{name}&application_name={name}");
+        Some(Self { database, blobs: format!("{bucket}/{name}"), name })
     }
 
     /// Address of the database.
     pub fn database(&self) -> &str {
         &self.database
+    }
+
+    /// Ends all connections of farms to this place's database, as when the server is started again; how many there were.
+    pub fn end_connections(&self, runtime: &tokio::runtime::Runtime) -> i64 {
+        runtime.block_on(async {
+            let options: PgConnectOptions = self.database.parse().expect("an address of PostgreSQL");
+            let mut connection = options.application_name("").connect().await.expect("the server answers");
+            let end =
+                "SELECT count(pg_terminate_backend(pid)) FROM pg_stat_activity WHERE application_name = $1";
+            let ended = sqlx::query_scalar(end).bind(&self.name).fetch_one(&mut connection).await;
+            connection.close().await.ok();
+            ended.expect("a superuser may")
+        })
     }
 
     /// Where the S3-compatible server is.

@@ -178,6 +178,23 @@ mod tests {
     }
 
     #[tokio::test]
+    async fn told_twice_a_worker_hands_everything_back_at_once() {
+        let farm = MockFarm::with_batches(5, 60.0).await;
+        let (worker, bell, _cache) = start(&farm, Conduct::Endless);
+        farm.until("two are held", |book| book.exchanges.last().is_some_and(|last| last.holding.len() == 2))
+            .await;
+        bell.ring(Leave::AfterBatch);
+        tokio::time::sleep(Duration::from_millis(100)).await;
+        assert!(farm.book().brought.is_empty(), "what it renders never ends");
+        bell.ring(Leave::Now);
+        ends(worker).await;
+        let book = farm.book();
+        let mut back: Vec<_> = book.given_back.iter().map(|(id, why)| (id.as_str(), why.kind)).collect();
+        back.sort_by_key(|(id, _)| *id);
+        assert_eq!(back, [("lease-0", FailureKind::HandedBack), ("lease-1", FailureKind::HandedBack)]);
+    }
+
+    #[tokio::test]
     async fn a_farm_that_restarts_finds_its_worker_at_work() {
         let farm = MockFarm::with_batches(20, 60.0).await;
         let (worker, bell, _cache) = start(&farm, Conduct::Slow(30));

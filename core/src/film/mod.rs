@@ -14,4 +14,5 @@ pub mod reference;
 pub mod schedule;
 pub mod shares;
 pub mod size;
+pub mod sketch;
 pub mod sum;

@@ -11,6 +11,7 @@ use crate::path::tally::Technique;
 use crate::scene::Scene;
 use crate::scene::interaction::Interaction;
 use crate::scene::light::Light;
+use crate::scene::light_names::ENVIRONMENT;
 use crate::scene::material::Material;
 use crate::settings::{Gloss, Method, Settings, Shadows, Shows, Strategy, Weights};
 use crate::trace::moment::Moment;
@@ -19,8 +20,6 @@ use glam::Vec4;
 
 /// Most light subpaths of a pass of photons.
 const PHOTON_PATHS_MAX: usize = 1 << 18;
-/// Name of the environment in path expressions.
-const ENVIRONMENT: &str = "environment";
 
 /// What a walk has to know of the settings.
 #[derive(Clone, Debug)]

@@ -14,6 +14,7 @@ use crate::path::reach::{EyeKind, LightKind, Surroundings};
 use crate::scene::camera::{Camera, Projection};
 use crate::scene::data::SceneData;
 use crate::scene::environment::Environment;
+use crate::scene::light_names::LightNames;
 use crate::scene::material::{Coverage, Material, RoughnessMap};
 use crate::scene::nearby::is_worth_a_tree;
 use crate::scene::punctual::PunctualKind;
@@ -35,6 +36,8 @@ pub struct Contents {
     pub report: Report,
     /// Punctual lights: points, spots, directional ones.
     pub punctual: [u32; 3],
+    /// How its lights are called.
+    pub light_names: LightNames,
     /// Width over height that each camera asks for.
     pub aspects: Vec<Option<f32>>,
     /// Whether each camera's rays are parallel.
@@ -68,6 +71,7 @@ pub fn inspect(bytes: impl Into<Arc<[u8]>>, limits: &Limits) -> Result<Contents,
     }
     Ok(Contents {
         punctual,
+        light_names: LightNames::of(data),
         aspects: data.cameras.iter().map(Camera::aspect).collect(),
         parallel: (data.cameras.iter())
             .map(|camera| matches!(camera.projection, Projection::Orthographic { .. }))

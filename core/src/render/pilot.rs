@@ -6,8 +6,10 @@ use crate::film::append::Prefix;
 use crate::film::batch::{Batch, Block};
 use crate::film::certificate::Look;
 use crate::film::error::estimate;
+use crate::film::estimate::picture;
 use crate::film::missed::missed;
 use crate::film::size::{Region, Size};
+use crate::film::sketch::Sketch;
 use crate::render::batch::{RenderError, render};
 use crate::render::prepare::{PrepareError, Prepared, prepare};
 use crate::render::progress::Progress;
@@ -26,7 +28,7 @@ const BLOCKS_MAX: u32 = 4;
 const PIXELS_MIN: f64 = 64.0;
 /// Most pixels of a pilot's pictures. They should be as small as the job's: edges are noise that all methods share, and there is
 /// the more of it the larger pixels are, which speaks for the method with the cheapest samples.
-const PIXELS_MAX: f64 = 8192.0;
+const PIXELS_MAX: f64 = 3600.0;
 /// A sample by each of all methods in samples of `path`, where nothing is known yet.
 const ALL_METHODS: f64 = 6.0;
 /// Reading a triangle and building its part of a tree, in samples of `path`.
@@ -37,8 +39,8 @@ const SAMPLES_A_SECOND: f64 = 1e5;
 const TRIANGLES_MAX: u64 = 1 << 20;
 /// Rays of a sample of the first method beyond which joining all vertices of two subpaths is not tried.
 const PATH_RAYS_MAX: f64 = 64.0;
-/// Work of a pilot, at most: a few seconds of a thread.
-const WORK_MAX: f64 = 4e6;
+/// Work of a pilot, at most, in microseconds of a thread: one who submits a job waits for it, and sees its picture first.
+const WORK_MAX: f64 = 1.25e6;
 /// Another method is taken where it needs less than so many times the first one's work.
 const GAIN: f64 = 0.95;
 /// The same where the first one meets light by chance: what few samples tell of its error is mostly too little. In the bundled room and
@@ -186,9 +188,13 @@ fn work(method: Method, rays: u64, samples: f64) -> f64 {
     a_ray * rays as f64 + a_sample * samples
 }
 
-/// Renders the pilot of a job. `environment` holds the bytes of the image that the settings name, if they do. Runs on the current
+/// Renders the pilot of a job, and gives the picture of it by the method that is taken. `environment` holds the bytes of the image that the settings name, if they do. Runs on the current
 /// rayon pool; the same arguments give the same pilot on any number of threads.
-pub fn pilot(bytes: impl Into<Arc<[u8]>>, environment: Option<&[u8]>, plan: &Plan) -> Result<Pilot, NoPilot> {
+pub fn pilot(
+    bytes: impl Into<Arc<[u8]>>,
+    environment: Option<&[u8]>,
+    plan: &Plan,
+) -> Result<(Pilot, Sketch), NoPilot> {
     plan.check()?;
     let job = plan.job();
     let (settings, region) = small(plan, plan.pixels().min(PIXELS_MAX));
@@ -199,7 +205,9 @@ pub fn pilot(bytes: impl Into<Arc<[u8]>>, environment: Option<&[u8]>, plan: &Pla
         trying.all.push((Settings { method: *method, ..settings.clone() }, lanes.collect()));
     }
     trying.run(job)?;
-    Ok(trying.finish(settings.size, job))
+    let pilot = trying.finish(settings.size, job);
+    let sketch = trying.sketch(settings.size, pilot.method);
+    Ok((pilot, sketch))
 }
 
 /// The same picture in about so many pixels.
@@ -313,6 +321,18 @@ impl Trying<'_> {
             }
         };
         self.all.iter().enumerate().map(trial).collect()
+    }
+
+    /// The picture by a method that was tried, of the region only.
+    fn sketch(&self, size: Size, method: Method) -> Sketch {
+        let tried = self.all.iter().find(|(settings, _)| settings.method == method);
+        let (_, lanes) = tried.expect("the method that is taken was tried");
+        let planes = picture(size, self.region, std::slice::from_ref(lanes)).planes;
+        let Region { width, height, .. } = self.region;
+        Sketch::new(
+            Size { width, height },
+            planes.into_iter().next().expect("the picture is the first plane"),
+        )
     }
 
     fn finish(&self, size: Size, job: f64) -> Pilot {

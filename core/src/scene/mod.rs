@@ -14,6 +14,7 @@ pub mod interaction;
 pub mod knots;
 pub mod light;
 pub mod light_bounds;
+pub mod light_names;
 pub mod light_tree;
 pub mod lights;
 pub mod lit;

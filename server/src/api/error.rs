@@ -107,6 +107,9 @@ impl From<FarmError> for ApiError {
             FarmError::TooManyJobs { .. } => {
                 of(StatusCode::TOO_MANY_REQUESTS, "too-many-jobs", "Too many jobs")
             }
+            FarmError::BeingRemoved(_) => {
+                of(StatusCode::SERVICE_UNAVAILABLE, "being-removed", "Being removed")
+            }
             FarmError::Full | FarmError::Blob(BlobError::Full) => {
                 of(StatusCode::INSUFFICIENT_STORAGE, "storage-full", "Storage full")
             }
@@ -136,6 +139,7 @@ impl IntoResponse for ApiError {
             self.0.kind.as_str(),
             "/problems/no-picture-yet"
                 | "/problems/stopping"
+                | "/problems/being-removed"
                 | "/problems/too-many-requests"
                 | "/problems/too-many-jobs"
         );

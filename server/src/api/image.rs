@@ -23,6 +23,8 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use std::sync::Arc;
 
+/// Of a picture that the pilot made, before there is any of the job: its size, before it was enlarged.
+const PREVIEW: HeaderName = HeaderName::from_static("ovtigre-preview");
 /// Stops of exposure, at most.
 const STOPS_MAX: f32 = 64.0;
 
@@ -79,7 +81,7 @@ pub struct PngParams {
     width: Option<u32>,
 }
 
-/// The merged picture so far, developed.
+/// The merged picture so far, developed. Before there is any of it, and unless a wait is asked for, the picture of the pilot.
 pub async fn png(
     State(farm): State<Arc<Farm>>,
     Named(name): Named,
@@ -107,8 +109,16 @@ pub async fn png(
             return Ok(answer(StatusCode::NOT_MODIFIED, &tag, waits, &[], Body::empty()));
         }
     }
-    let (manifest, bytes) = farm.png(&id, layer, develop).await?;
     let kind = (header::CONTENT_TYPE, HeaderValue::from_static("image/png"));
+    let made = farm.png(&id, layer.clone(), develop).await;
+    if let (Err(FarmError::NoPicture(_)), Waited::No) = (&made, waits)
+        && let Some((size, bytes)) = farm.sketch(&id, &layer, develop).await?
+    {
+        let of = HeaderValue::from_str(&size.to_string()).expect("digits");
+        let heads = [kind, (PREVIEW, of)];
+        return Ok(answer(StatusCode::OK, &format!("preview{suffix}"), waits, &heads, bytes.into()));
+    }
+    let (manifest, bytes) = made?;
     Ok(answer(StatusCode::OK, &(manifest + &suffix), waits, &[kind], bytes.into()))
 }
 

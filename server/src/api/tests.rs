@@ -164,6 +164,38 @@ async fn a_job_is_rendered_over_http_alone() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn an_upload_that_was_cut_off_goes_on_where_it_was() {
+    let doors = Doors::open().await;
+    let bytes = "a scene in three parts";
+    let path = format!("/v1/scenes/{}", blake3::hash(bytes.as_bytes()).to_hex());
+    let put = async |range: &str, body: &'static str| {
+        doors.send(Method::PUT, &path, &[("content-range", range)], body).await
+    };
+    let received = |answer: &Answer| {
+        assert_eq!(answer.status, StatusCode::ACCEPTED, "{:?}", answer.body);
+        (answer.json()["received"].as_u64().unwrap(), answer.json()["bytes"].as_u64().unwrap())
+    };
+    assert_eq!(received(&put("bytes */22", "").await), (0, 22));
+    assert_eq!(received(&put("bytes 0-6/22", &bytes[..7]).await), (7, 22));
+    // Cut off: fewer bytes than the range says are not kept.
+    put("bytes 7-13/22", &bytes[7..10]).await.problem(422, "invalid-job");
+    assert_eq!(received(&put("bytes */22", "").await), (7, 22));
+    for (range, status, kind) in [
+        ("bytes 9-3/22", 416, "range-not-satisfiable"),
+        ("bytes 9-22/22", 416, "range-not-satisfiable"),
+        ("9-12", 400, "invalid-header"),
+        ("bytes 0-6/99999999999999", 413, "too-large"),
+    ] {
+        put(range, &bytes[..7]).await.problem(status, kind);
+    }
+    assert_eq!(received(&put("bytes 14-21/22", &bytes[14..]).await), (7, 22), "as far as there is no gap");
+    let whole = put("bytes 7-13/22", &bytes[7..14]).await;
+    assert_eq!(whole.status, StatusCode::CREATED, "{:?}", whole.body);
+    assert_eq!(doors.get(&format!("{path}/bytes")).await.body, bytes);
+    assert_eq!(put("bytes 0-6/22", &bytes[..7]).await.status, StatusCode::OK, "it is there");
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn every_error_is_a_problem_document() {
     let doors = Doors::open().await;
     let json = ("content-type", "application/json");

@@ -26,10 +26,14 @@ pub(crate) struct Check {
     json: bool,
 }
 
+/// Names of lights that are shown, at most.
+const NAMES_SHOWN: usize = 32;
+
 /// As JSON.
 #[derive(Serialize)]
 struct Document<'a> {
     contents: &'a ovtigre_core::gltf::report::Report,
+    light_names: &'a std::collections::BTreeSet<String>,
     needs: &'a [String],
     leaves_out: &'a [String],
     /// What a render with default flags chooses from.
@@ -63,6 +67,7 @@ fn document(contents: &Contents) -> Document<'_> {
     let (open, unreachable) = methods(contents);
     Document {
         contents: &contents.report,
+        light_names: &contents.light_names.all,
         needs: &contents.needs,
         leaves_out: &contents.leaves_out,
         methods: open.into_iter().map(Method::name).collect(),
@@ -120,6 +125,7 @@ fn show(contents: &Contents) {
         ("materials", report.materials.to_string()),
         ("textures", format!("{}, {} pixels", report.textures, report.pixels)),
         ("lights", or_none(lights, "none: a default sky lights it")),
+        ("light names", light_names(contents)),
         ("cameras", or_none(cameras(contents), "none: the whole scene is framed")),
         ("variants", variants(contents)),
         ("memory", words::bytes(report.bytes)),
@@ -135,6 +141,16 @@ fn show(contents: &Contents) {
         let pointer = if warning.pointer.is_empty() { "/" } else { &warning.pointer };
         terminal::result(&format!("warning: {pointer}: {}", warning.detail));
     }
+}
+
+/// How the lights are called, for `L'name'`.
+fn light_names(contents: &Contents) -> String {
+    let all = &contents.light_names.all;
+    let mut some: Vec<String> = all.iter().take(NAMES_SHOWN).map(|name| format!("'{name}'")).collect();
+    if all.len() > NAMES_SHOWN {
+        some.push(format!("and {} more", all.len() - NAMES_SHOWN));
+    }
+    words::list(&some)
 }
 
 fn variants(contents: &Contents) -> String {

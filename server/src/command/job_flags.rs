@@ -11,7 +11,7 @@ use ovtigre_core::{
 };
 use ovtigre_proto::{
     id::BlobId,
-    job::{JobRequest, MethodRequest, WeightsRequest},
+    job::{JobRequest, LAYER_OF_EACH_LIGHT, MethodRequest, WeightsRequest},
     pair::EnvironmentRequest,
     webhook::WebhookRequest,
 };
@@ -52,7 +52,7 @@ pub(crate) struct JobFlags {
     /// How light is estimated [default: auto].
     #[arg(long, value_parser = named::<MethodRequest>(&["auto", "path", "light", "bidirectional", "photon", "radiosity"]))]
     pub(crate) method: Option<MethodRequest>,
-    /// A further picture of only those paths, or of a technique (s,t) of bidirectional; repeatable.
+    /// A further picture of only those paths, or of a technique (s,t) of bidirectional; `lights` is one for each light that has a name; repeatable.
     #[arg(long = "layer", value_name = "NAME=EXPR", value_parser = layer)]
     pub(crate) layers: Vec<String>,
     /// Only these (s,t) techniques of bidirectional, such as "0,3;1,2" [default: all].
@@ -195,6 +195,7 @@ fn paths(text: &str) -> Result<String, String> {
 /// What a technique makes of a layer is for the farm to judge.
 fn layer(text: &str) -> Result<String, String> {
     match text.split_once('=') {
+        None if text.trim() == LAYER_OF_EACH_LIGHT => Ok(text.to_owned()),
         Some((name, shows)) if !name.trim().is_empty() && !shows.trim().is_empty() => {
             let technique = shows.trim().starts_with('(') && shows.contains(',') && !shows.contains('{');
             if !technique {
@@ -202,7 +203,7 @@ fn layer(text: &str) -> Result<String, String> {
             }
             Ok(text.to_owned())
         }
-        _ => Err("write NAME=EXPR, such as direct=LDE".to_owned()),
+        _ => Err("write NAME=EXPR, such as direct=LDE, or lights".to_owned()),
     }
 }
 

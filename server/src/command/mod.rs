@@ -17,6 +17,7 @@ mod fetch;
 mod follow;
 mod interrupt;
 mod job_flags;
+mod keep;
 mod local_workers;
 mod manual;
 mod output;

@@ -4,6 +4,7 @@ use super::{
     embedded::share_of_cores,
     exit::{CommandError, Outcome},
     interrupt::Interrupt,
+    keep::{Limit, kept, limit},
     local_workers::{LocalWorkers, Team, WorkerLog},
     secret, terminal,
 };
@@ -21,7 +22,6 @@ use std::{
     net::{IpAddr, SocketAddr},
     num::NonZeroUsize,
     path::{Path, PathBuf},
-    time::Duration,
 };
 
 /// Run a farm.
@@ -63,9 +63,10 @@ pub(crate) struct Serve {
     /// GiB on the disk that are kept free: below, nothing new is taken and no batch is handed out.
     #[arg(long, value_name = "GIB", default_value_t = 1.0, value_parser = not_negative)]
     reserve: f64,
-    /// Days for which jobs that are over are kept, with their pictures [default: for ever].
-    #[arg(long, value_name = "DAYS", value_parser = not_negative)]
-    keep: Option<f64>,
+    /// How long jobs that are over are kept with their pictures, as 30d, 12h or 8w, and how many bytes of their files, as
+    /// 200GB or 1TiB, or both, as 30d,200GB; those that are over longest go first [default: all, for ever].
+    #[arg(long, value_name = "TIME,SIZE", value_delimiter = ',', value_parser = limit)]
+    keep: Vec<Limit>,
     /// Look whether what the database names is among the files, say what is lost, and leave.
     #[arg(long)]
     check: bool,
@@ -191,7 +192,7 @@ impl Serve {
             reserve_bytes: (self.reserve * f64::from(1 << 30)) as u64,
             jobs_per_token: self.jobs_per_token,
             partials_kept: self.partials_kept,
-            kept: self.keep.and_then(|days| Duration::try_from_secs_f64(days * 86_400.0).ok()),
+            kept: kept(&self.keep),
             notices_to: if self.private_webhooks { Reach::Anywhere } else { Reach::Public },
             // Where blobs are elsewhere the disk is not what fills.
             room: Room::new(move || free_bytes(&disk)),

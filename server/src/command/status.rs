@@ -86,10 +86,11 @@ pub(crate) fn show(job: &JobStatus) {
                 let error = layer.error.and_then(|e| e.relative_error);
                 let mean = layer.error.map(|e| e.mean_luminance);
                 let error = error.map(|error| format!("±{error:.4}")).unwrap_or_default();
-                [layer.name.clone(), layer.shows.clone(), number(mean), error]
+                let rms = layer.error.and_then(|e| e.rms_error);
+                [layer.name.clone(), layer.shows.clone(), number(mean), error, number(rms)]
             })
             .collect();
-        table::print(["LAYER", "SHOWS", "MEAN LUMINANCE", "ERROR"], &rows);
+        table::print(["LAYER", "SHOWS", "MEAN LUMINANCE", "ERROR", "RMS ERROR"], &rows);
     }
     for warning in &job.warnings {
         terminal::result(&format!("warning: {warning}"));

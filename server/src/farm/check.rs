@@ -43,7 +43,7 @@ pub async fn check(store: &dyn Store, blobs: &Blobs) -> Result<Checked> {
             checked.jobs += 1;
             let mut files = vec![row.scene.clone()];
             match read_spec(row) {
-                Ok(spec) => files.extend(spec.fetched),
+                Ok(spec) => files = spec.files(&row.scene),
                 Err(error) => {
                     checked.lost.push(format!("job {}: its document cannot be read: {error}", row.id));
                 }

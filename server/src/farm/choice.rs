@@ -9,8 +9,8 @@ use super::{
     spec::JobSpec,
     submit::resolve,
 };
-use crate::blobs::BlobName;
 use ovtigre_core::{
+    film::sketch::Sketch,
     render::pilot::{Chance, NoPilot, Pilot, Plan, pilot},
     settings::Method,
 };
@@ -59,26 +59,27 @@ pub(super) fn candidates(
 }
 
 impl Farm {
-    /// The job by one of `candidates`, with the reason why.
+    /// The job by one of `candidates`, with the reason why, and the picture of the pilot where there was one.
     pub(super) async fn chosen_of(
         &self,
         mut candidates: Vec<JobSpec>,
         scene: &SceneContents,
-    ) -> Result<JobSpec> {
+    ) -> Result<(JobSpec, Option<Sketch>)> {
         if candidates.len() == 1 {
-            return Ok(candidates.remove(0));
+            return Ok((candidates.remove(0), None));
         }
         let tried = self.pilot(&candidates, scene).await?;
-        let method = tried.as_ref().map_or(candidates[0].settings.method, |pilot| pilot.method);
+        let method = tried.as_ref().map_or(candidates[0].settings.method, |(pilot, _)| pilot.method);
         let mut spec = candidates.swap_remove(
             candidates.iter().position(|spec| spec.settings.method == method).expect("it was tried"),
         );
         spec.method_reason = match &tried {
-            Ok(pilot) => reason(pilot),
+            Ok((pilot, _)) => reason(pilot),
             Err(why) => format!("nothing speaks against it, and {why}"),
         };
-        spec.pilot = tried.ok();
-        Ok(spec)
+        let (pilot, sketch) = tried.ok().unzip();
+        spec.pilot = pilot;
+        Ok((spec, sketch))
     }
 
     /// Tries the candidates for one job, or says why not. Reads the scene whole, as an inspection does.
@@ -86,7 +87,7 @@ impl Farm {
         &self,
         candidates: &[JobSpec],
         scene: &SceneContents,
-    ) -> Result<std::result::Result<Pilot, NoPilot>> {
+    ) -> Result<std::result::Result<(Pilot, Sketch), NoPilot>> {
         let spec = &candidates[0];
         let plan = Plan {
             settings: spec.settings.clone(),
@@ -106,9 +107,9 @@ impl Farm {
         }
         let _turn = self.inspectors.acquire().await.map_err(|_| FarmError::Stopping)?;
         let id = spec.request.scene.clone().expect("checked: a scene is there");
-        let bytes = self.blobs.get(&BlobName::Scene(id)).await?;
+        let bytes = self.upload_bytes("/scene", &id).await?;
         let environment = match &spec.request.environment {
-            Some(EnvironmentRequest::Image(id)) => Some(self.blobs.get(&BlobName::Scene(id.clone())).await?),
+            Some(EnvironmentRequest::Image(id)) => Some(self.upload_bytes("/environment", id).await?),
             Some(EnvironmentRequest::Uniform(_)) | None => None,
         };
         blocking(move || pilot(&bytes[..], environment.as_deref(), &plan)).await

@@ -99,6 +99,9 @@ pub enum FarmError {
     /// What is kept of a job cannot be used.
     #[error("what is kept of the job cannot be used: {0}")]
     Damaged(String),
+    /// A file that comes while its bytes are removed, as no job needed them.
+    #[error("the file '{0}' is just being removed, as no job needed it: send it again")]
+    BeingRemoved(BlobId),
     /// Too many jobs of one token.
     #[error("there are {most} jobs under way of this token: wait for some to end, or cancel some")]
     TooManyJobs {

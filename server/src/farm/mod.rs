@@ -15,8 +15,9 @@ pub mod error;
 pub mod extend;
 pub mod ids;
 pub mod join;
-mod keep;
+pub mod keep;
 pub mod lease;
+mod light_groups;
 pub mod live;
 pub mod mandates;
 pub mod needs;
@@ -31,6 +32,7 @@ pub mod reach;
 pub mod reap;
 pub mod rules;
 pub mod scene;
+mod sketches;
 pub mod solution;
 pub mod space;
 pub mod spec;
@@ -39,6 +41,8 @@ pub mod status;
 pub mod stop;
 mod strip;
 pub mod submit;
+mod sweep;
+mod unused;
 
 #[cfg(test)]
 pub(crate) mod tests;
@@ -84,6 +88,7 @@ pub struct Farm {
     ids: Ids,
     fullness: space::Fullness,
     shown: picture::Shown,
+    sketches: sketches::Sketches,
     tasks: TaskTracker,
     decoders: tokio::sync::Semaphore,
     inspectors: tokio::sync::Semaphore,

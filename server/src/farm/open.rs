@@ -11,7 +11,7 @@ use super::{
     split::Plan,
 };
 use crate::{
-    blobs::{BlobFolder, Blobs},
+    blobs::Blobs,
     store::{Store, row::JobRow},
     webhook::Messenger,
 };
@@ -21,7 +21,7 @@ use std::{
     num::NonZero,
     sync::{Arc, Mutex},
     thread::available_parallelism,
-    time::Duration,
+    time::{Duration, SystemTime},
 };
 use tokio::sync::Semaphore;
 
@@ -53,6 +53,7 @@ impl Farm {
             inspect,
             fullness: super::space::Fullness::default(),
             shown: super::picture::Shown::default(),
+            sketches: super::sketches::Sketches::default(),
             ids,
             tasks: tokio_util::task::TaskTracker::new(),
             decoders: Semaphore::new(processors),
@@ -73,11 +74,13 @@ impl Farm {
         } else {
             farm.sweep().await?;
         }
+        farm.tasks.spawn(Arc::clone(&farm).remove_staged(SystemTime::now()));
         for row in farm.store.unsettled_jobs().await? {
             farm.take_up(&row).await?;
         }
         farm.tasks.spawn(Arc::clone(&farm).tick());
         farm.tasks.spawn(Arc::clone(&farm).tell());
+        farm.tasks.spawn(Arc::clone(&farm).keep_house());
         Ok(farm)
     }
 
@@ -90,24 +93,6 @@ impl Farm {
             tracing::warn!(%error, "other servers go on only after a while");
         }
         self.store.close().await;
-    }
-
-    /// Removes uploads that were cut off, and files of jobs that are over or that are not there.
-    async fn sweep(&self) -> Result<()> {
-        if self.is_shared() {
-            self.blobs.delete_older(&BlobFolder::Incoming, UPLOAD_MAX).await?;
-        } else {
-            self.blobs.delete_all(&BlobFolder::Incoming).await?;
-        }
-        self.blobs.delete_older(&BlobFolder::AllParts, UPLOAD_MAX).await?;
-        for id in self.blobs.jobs().await? {
-            match self.store.job(&id).await? {
-                None => self.blobs.delete_all(&BlobFolder::Job(id)).await?,
-                Some(row) if row.settled => self.remove_leftovers(&id).await?,
-                Some(_) => {}
-            }
-        }
-        Ok(())
     }
 
     /// A job in the store that is not settled goes on.
@@ -151,5 +136,10 @@ impl Farm {
 
 /// The document of a job in the store.
 pub fn read_spec(row: &JobRow) -> Result<JobSpec> {
-    serde_json::from_str(&row.spec).map_err(|e| FarmError::Damaged(e.to_string()))
+    read_document(&row.spec)
+}
+
+/// A job's document.
+pub(super) fn read_document(text: &str) -> Result<JobSpec> {
+    serde_json::from_str(text).map_err(|e| FarmError::Damaged(e.to_string()))
 }

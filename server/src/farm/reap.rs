@@ -5,9 +5,8 @@ use super::{
     counters::Fate,
     error::{FarmError, Result},
     live::{Ending, Live, Waits},
-    open::UPLOAD_MAX,
 };
-use crate::{blobs::BlobFolder, store::error::StoreError};
+use crate::store::error::StoreError;
 use ovtigre_proto::{lease::FailureKind, status::JobState};
 use std::{
     sync::Arc,
@@ -73,7 +72,6 @@ impl Farm {
         beat.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
         let mut keep = tokio::time::interval(self.rules.keep_mandate);
         keep.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
-        let mut hour = tokio::time::interval(Duration::from_hours(1));
         let mut latest = Instant::now();
         loop {
             let done = tokio::select! {
@@ -84,20 +82,11 @@ impl Farm {
                     let awake = std::mem::replace(&mut latest, Instant::now()).elapsed() < self.rules.missed / 2;
                     self.reap_and_follow(awake).await
                 }
-                _ = hour.tick() => self.forget_old().await,
             };
             if let Err(error) = done {
                 tracing::error!(%error, "looking after leases and deadlines failed");
             }
         }
-    }
-
-    /// Forgets idempotency keys, jobs that were kept long enough, and uploads that were cut off.
-    pub(super) async fn forget_old(&self) -> Result<()> {
-        self.let_go().await?;
-        self.store.forget_keys(self.rules.keys).await?;
-        self.blobs.delete_older(&BlobFolder::AllParts, UPLOAD_MAX).await?;
-        Ok(self.blobs.delete_older(&BlobFolder::Incoming, UPLOAD_MAX).await?)
     }
 
     async fn reap_and_follow(self: &Arc<Self>, awake: bool) -> Result<()> {

@@ -1,6 +1,6 @@
 //! The farm's numbers.
 
-use super::space::Room;
+use super::{keep::Kept, space::Room};
 use crate::webhook::Reach;
 use std::time::Duration;
 
@@ -64,8 +64,10 @@ pub struct Rules {
     pub notice_rest: Duration,
     /// Idempotency keys are remembered so long.
     pub keys: Duration,
-    /// Jobs that are over are kept so long, and for ever where it is not said.
-    pub kept: Option<Duration>,
+    /// What is kept of jobs that are over.
+    pub kept: Kept,
+    /// An uploaded file that no job needs is kept so long after it was used last.
+    pub unused: Duration,
     /// Says how much room there is.
     pub room: Room,
     /// Bytes of it that are kept free.
@@ -104,7 +106,8 @@ impl Default for Rules {
             notices_to: Reach::Public,
             notice_rest: Duration::from_secs(5),
             keys: Duration::from_hours(24),
-            kept: None,
+            kept: Kept::default(),
+            unused: Duration::from_hours(24),
             room: Room::endless(),
             reserve_bytes: 1 << 30,
             scene_bytes: 2 << 30,

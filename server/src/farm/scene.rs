@@ -4,6 +4,7 @@ use super::{
     Farm,
     append::blocking,
     error::{FarmError, Result, fault},
+    open::UPLOAD_MAX,
 };
 use crate::{
     blobs::{BlobError, BlobName, Upload},
@@ -93,42 +94,59 @@ impl Farm {
             incoming.abort().await;
             return Err(FarmError::HashMismatch { named: named.clone(), got: id });
         }
-        if let Some(row) = self.store.scene(&id).await? {
+        if let Some(report) = self.uploaded(&id).await? {
             incoming.abort().await;
-            return Ok((row.report, Novelty::Known));
+            return Ok((report, Novelty::Known));
         }
         if incoming.bytes == 0 {
             incoming.abort().await;
             return Err(FarmError::Scene(vec![fault("", "the file is empty")]));
         }
         let (name, bytes) = (BlobName::Scene(id.clone()), incoming.bytes);
+        if let Err(error) = self.let_removal_end(&id).await {
+            incoming.abort().await;
+            return Err(error);
+        }
         FailPoint::SceneBeforeBlob.pass();
         incoming.upload.finish(&name).await?;
         FailPoint::SceneAfterBlob.pass();
-        let content = match self.look_into(&name).await {
-            Ok(content) => content,
+        let (content, file) = match self.look_into(&id).await {
+            Ok(found) => found,
             Err(error) => {
-                self.blobs.delete(&name).await?;
+                // Not where somebody else has sent the same, and could read it.
+                self.drop_file(&id, UPLOAD_MAX).await?;
                 return Err(error);
             }
         };
         let report = SceneReport { id, bytes, content };
-        self.store.add_scene(report.clone()).await?;
+        self.remember(report.clone(), file).await?;
         FailPoint::SceneAfterRow.pass();
         Ok((report, Novelty::New))
     }
 
-    async fn look_into(&self, name: &BlobName) -> Result<SceneContent> {
+    async fn look_into(&self, id: &BlobId) -> Result<(SceneContent, Bytes)> {
         let _turn = self.inspectors.acquire().await.map_err(|_| FarmError::Stopping)?;
-        let bytes = self.blobs.get(name).await?;
-        let inspect = self.inspect.clone();
-        blocking(move || (inspect.0)(bytes)).await?.map_err(|fault| FarmError::Scene(vec![fault]))
+        let bytes = match self.blobs.get(&BlobName::Scene(id.clone())).await {
+            // Who sent the same at the same time could not read it, and removes it.
+            Err(BlobError::Missing(_)) => return Err(FarmError::BeingRemoved(id.clone())),
+            other => other?,
+        };
+        let (inspect, file) = (self.inspect.clone(), bytes.clone());
+        let content = blocking(move || (inspect.0)(file)).await?;
+        Ok((content.map_err(|fault| FarmError::Scene(vec![fault]))?, bytes))
     }
 
-    /// What is in an uploaded file.
+    /// What is in an uploaded file. Who is told stays right for a while: the file is used now.
     pub async fn scene(&self, id: &BlobId) -> Result<SceneReport> {
-        let row = self.store.scene(id).await?;
-        row.map(|row| row.report).ok_or_else(|| FarmError::not_found("scene", id))
+        self.uploaded(id).await?.ok_or_else(|| FarmError::not_found("scene", id))
+    }
+
+    /// The same, where there is such a file.
+    pub(super) async fn uploaded(&self, id: &BlobId) -> Result<Option<SceneReport>> {
+        let Some(row) = self.store.scene(id).await? else { return Ok(None) };
+        // Not written down each time that somebody looks.
+        let is_used = row.unused < self.rules.unused / 2 || self.store.use_scene(id).await?;
+        Ok(is_used.then_some(row.report))
     }
 
     /// An uploaded file's size and bytes.

@@ -10,7 +10,7 @@ use ovtigre_core::{
     render::pilot::Pilot,
     settings::{CameraChoice, FULL, Gloss, Method, Settings, Shadows, Shutter, Weights},
 };
-use ovtigre_proto::{id::BlobId, job::JobRequest, needs::Needs};
+use ovtigre_proto::{id::BlobId, job::JobRequest, needs::Needs, pair::EnvironmentRequest};
 use serde::{Deserialize, Deserializer, Serialize, de::Error as _};
 use serde_json::Value;
 use std::sync::LazyLock;
@@ -102,6 +102,16 @@ impl JobSpec {
     /// The file that its workers fetch and render.
     pub fn fetched<'a>(&'a self, scene: &'a BlobId) -> &'a BlobId {
         self.fetched.as_ref().unwrap_or(scene)
+    }
+
+    /// Uploaded files that are needed to render it, and to render it once more.
+    pub fn files(&self, scene: &BlobId) -> Vec<BlobId> {
+        let mut files = vec![scene.clone()];
+        files.extend(self.fetched.clone());
+        if let Some(EnvironmentRequest::Image(image)) = &self.request.environment {
+            files.push(image.clone());
+        }
+        files
     }
 
     /// Hash of all that a sum depends on beside its batch.

@@ -4,6 +4,7 @@ use super::{
     Farm,
     choice::candidates,
     error::{FarmError, Result, fault},
+    light_groups::{expanded, unknown},
     needs::needs,
     paths::choose,
     reach::{letters, line, missing},
@@ -20,7 +21,10 @@ use crate::{
 };
 use ovtigre_core::{
     bsdf::event::Letters,
-    film::size::{Region, Size},
+    film::{
+        size::{Region, Size},
+        sketch::Sketch,
+    },
     path::expression::language::Language,
     render::inspect::{DEFAULT_SKY, by_chance},
     settings::{CameraChoice, Environment, EnvironmentSource, Lens, Settings, Shutter},
@@ -55,6 +59,11 @@ const ASPECT_DEFAULT: f64 = 16.0 / 9.0;
 impl Farm {
     /// Checks a request; what it would become, or all its faults.
     pub async fn check(&self, request: JobRequest) -> Result<JobSpec> {
+        Ok(self.sketched(request).await?.0)
+    }
+
+    /// The same, with a small picture of the job where one was made on the way.
+    async fn sketched(&self, request: JobRequest) -> Result<(JobSpec, Option<Sketch>)> {
         self.webhook(&request)?;
         let scene = request.scene.clone();
         let scene = scene.ok_or_else(|| FarmError::Request(vec![fault("/scene", "'scene' is required")]))?;
@@ -82,10 +91,11 @@ impl Farm {
                 }
             },
         }
+        let request = expanded(request, &contents).map_err(FarmError::Request)?;
         let candidates = candidates(&request, &contents, &self.rules).map_err(FarmError::Request)?;
-        let mut spec = self.chosen_of(candidates, &contents).await?;
+        let (mut spec, sketch) = self.chosen_of(candidates, &contents).await?;
         spec.request.webhook = spec.request.webhook.as_ref().map(webhook::shown);
-        Ok(spec)
+        Ok((spec, sketch))
     }
 
     /// Whom to tell of the job's changes.
@@ -105,12 +115,8 @@ impl Farm {
         }
     }
 
-    async fn upload_at(&self, pointer: &str, id: &BlobId) -> Result<SceneReport> {
-        let row = self.store.scene(id).await?;
-        row.map(|row| row.report).ok_or_else(|| {
-            let detail = format!("'{id}' was not uploaded: PUT its bytes to /v1/scenes/{id} first");
-            FarmError::Request(vec![fault(pointer, detail)])
-        })
+    pub(super) async fn upload_at(&self, pointer: &str, id: &BlobId) -> Result<SceneReport> {
+        self.uploaded(id).await?.ok_or_else(|| not_uploaded(pointer, id))
     }
 
     /// Takes a job of `owner`, a token's id. The same request of one owner under the same key is taken once.
@@ -138,7 +144,7 @@ impl Farm {
         }
         self.need_room()?;
         let webhook = self.webhook(&request)?;
-        let mut spec = self.check(request).await?;
+        let (mut spec, sketch) = Box::pin(self.sketched(request)).await?;
         self.has_room_for(owner.as_deref())?;
         self.strip(&mut spec).await?;
         spec.owner = owner;
@@ -147,6 +153,7 @@ impl Farm {
         let new = NewJob {
             id: id.clone(),
             name: spec.request.name.clone().unwrap_or_else(|| scene.as_str()[..12].to_owned()),
+            files: spec.files(&scene),
             scene,
             priority: spec.request.priority.unwrap_or(0),
             spec: serde_json::to_string(&spec).map_err(|e| FarmError::Damaged(e.to_string()))?,
@@ -162,6 +169,9 @@ impl Farm {
                 tracing::info!(job = %id, name = row.name, "job taken");
                 let span = self.traces.span("submit", Place::OfJob(&id)).since(came);
                 let _span = span.note("ovtigre.scene", row.scene.to_string());
+                if let Some(sketch) = sketch {
+                    self.sketches.keep(id, sketch);
+                }
                 self.take_up(&row).await?;
                 self.status_of(&row).await
             }
@@ -172,9 +182,16 @@ impl Farm {
     async fn taken_before(&self, before: Added) -> Result<JobStatus> {
         match before {
             Added::New | Added::KeyTaken => Err(FarmError::KeyTaken),
+            // It was there when the request was checked.
+            Added::Lacks(file) => Err(not_uploaded("/scene", &file)),
             Added::Before(id) => self.status(&id).await,
         }
     }
+}
+
+pub(super) fn not_uploaded(pointer: &str, id: &BlobId) -> FarmError {
+    let detail = format!("'{id}' was not uploaded: PUT its bytes to /v1/scenes/{id} first");
+    FarmError::Request(vec![fault(pointer, detail)])
 }
 
 /// Whether samples can be split over replicates, and replicates tell an error.
@@ -238,10 +255,12 @@ pub fn resolve(
     }
     let lit = if request.environment.is_some() { Lit::ByRequest } else { Lit::ByScene };
     let words = language.as_ref().map_or(Letters::NONE, Language::letters);
+    let unnamed = language.as_ref().and_then(|language| unknown(language, &request, scene));
     let unreachable = language
         .map(|language| missing(&language, chosen.method, &request, scene, camera, lens))
         .unwrap_or_default();
     let mut warnings = warnings(scene, lit, camera, samples, replicates);
+    warnings.extend(unnamed);
     warnings.extend(unreachable.iter().map(line));
     let mut spec = JobSpec {
         settings: Settings {

@@ -5,6 +5,7 @@ mod ending;
 mod extending;
 mod faults;
 mod housekeeping;
+mod keeping;
 mod layers;
 mod merging;
 mod replicas;

@@ -168,10 +168,14 @@ export class Viewer {
     const blob = await response.blob();
     // Something else may be compared with by now.
     if (side === this.#b && against !== this.#against) return;
+    const preview = response.headers.get('ovtigre-preview');
     await side.draw(blob, this.#isError(layer));
     this.message.hidden = true;
     this.stage.classList.add('filled');
-    if (side === this.#a) {
+    if (side === this.#a && preview) {
+      this.stage.setAttribute('aria-label', `A preview of ${preview} pixels`);
+      text(this.version, `Shown: a preview of ${preview} pixels, made while the method was chosen.`);
+    } else if (side === this.#a) {
       this.stage.setAttribute('aria-label', `${layer === 'picture' ? 'The picture' : layer} after ${samples(this.#job.samples_done)} samples a pixel`);
       text(this.version, `Shown: ${samples(this.#job.samples_done)} samples a pixel.`);
       if (layer === 'picture') this.#latest = { blob, samples: this.#job.samples_done, at: this.#job.wall_seconds };

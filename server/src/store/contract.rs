@@ -1,7 +1,7 @@
 //! What every store does: one suite, run on each.
 
 use super::{
-    Store, contract_changes as changes, contract_lists as lists,
+    Store, contract_changes as changes, contract_kept as kept, contract_lists as lists,
     error::StoreError,
     row::{
         Added, BatchKey, Claim, CommitOutcome, CommitRow, IdempotencyKey, JobChange, Lane, Mandate,
@@ -38,6 +38,7 @@ pub(super) fn new_job(name: &str) -> NewJob {
         id: id(name),
         name: format!("job {name}"),
         scene: hash(1),
+        files: Vec::new(),
         priority: 0,
         spec: "{}".to_owned(),
         regions: 2,
@@ -92,6 +93,10 @@ pub(crate) async fn run<F: Future<Output = Arc<dyn Store>>>(open: impl Fn() -> F
     changes::a_job_is_extended(&*open().await).await;
     changes::changes_of_a_job_are_told_of_in_order(&*open().await).await;
     changes::tokens_and_workers_put_aside_are_remembered(&*open().await).await;
+    kept::a_file_that_no_job_needs_is_dropped(&*open().await).await;
+    kept::files_of_jobs_of_earlier_versions_are_found(&*open().await).await;
+    kept::a_job_and_the_removal_of_its_scene_are_never_both_done(open().await).await;
+    kept::jobs_that_are_settled_are_counted_the_longest_over_first(&*open().await).await;
     many_at_once_are_each_done_once(open().await).await;
 }
 

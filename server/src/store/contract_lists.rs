@@ -37,6 +37,8 @@ pub(super) async fn jobs_are_listed_page_by_page(store: &dyn Store) {
     let open: Vec<_> =
         store.unsettled_jobs().await.unwrap().into_iter().map(|row| row.id.to_string()).collect();
     assert_eq!(open, ["a", "b", "c", "d"], "the oldest first");
+    assert_eq!(store.unknown_jobs(vec![id("x"), id("b"), id("y")]).await.unwrap(), [id("x"), id("y")]);
+    assert_eq!(store.unknown_jobs(Vec::new()).await.unwrap(), []);
     assert_eq!(store.counts().await.unwrap().jobs.iter().map(|(_, n)| n).sum::<u64>(), 4);
 }
 

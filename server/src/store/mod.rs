@@ -3,6 +3,7 @@
 //! A store has no rules beyond atomicity and its clock. What may be done is the farm's to decide.
 
 pub mod error;
+pub mod kept;
 pub mod list;
 pub mod notice;
 pub mod row;
@@ -13,9 +14,12 @@ pub mod contract;
 #[cfg(test)]
 mod contract_changes;
 #[cfg(test)]
+mod contract_kept;
+#[cfg(test)]
 mod contract_lists;
 
 use error::Result;
+use kept::{KeptJob, UnfiledJob};
 use list::{JobFilter, Standing};
 use notice::NoticeRow;
 use ovtigre_proto::{
@@ -48,17 +52,45 @@ pub trait Store: Send + Sync + fmt::Debug {
     /// Whether several farms may have it.
     fn sharing(&self) -> Sharing;
 
-    /// Remembers an uploaded file; again changes nothing.
-    async fn add_scene(&self, report: SceneReport) -> Result<()>;
+    /// Remembers an uploaded file, and that it is used now; again changes nothing else. False while its bytes are being
+    /// removed.
+    async fn add_scene(&self, report: SceneReport) -> Result<bool>;
     /// An uploaded file.
     async fn scene(&self, id: &BlobId) -> Result<Option<SceneRow>>;
+    /// An uploaded file is used now; false where there is none.
+    async fn use_scene(&self, id: &BlobId) -> Result<bool>;
+    /// Files that no job needs and nobody used for `unused`, `most` of them at most.
+    async fn unused_scenes(&self, unused: Duration, most: u32) -> Result<Vec<BlobId>>;
+    /// Forgets such a file, or one that it never knew, so that its bytes can be removed: until that is told, nobody adds
+    /// it. False where it is needed or used, or known while the files of some job are not.
+    async fn drop_scene(&self, id: &BlobId, unused: Duration) -> Result<bool>;
+    /// Whether the bytes of a file are being removed.
+    async fn is_dropped(&self, id: &BlobId) -> Result<bool>;
+    /// Files whose bytes were to be removed `time` ago and are not told to be: this is done again, from now.
+    async fn dropped_before(&self, time: Duration) -> Result<Vec<BlobId>>;
+    /// The bytes of a file are removed: it may be added again.
+    async fn end_drop(&self, id: &BlobId) -> Result<()>;
+    /// Jobs of which it is not known which files they need, `most` of them at most.
+    async fn unfiled(&self, most: u32) -> Result<Vec<UnfiledJob>>;
+    /// Which files each of those jobs needs.
+    async fn file(&self, jobs: Vec<(JobId, Vec<BlobId>)>) -> Result<()>;
+    /// Jobs that are settled, the longest over first, `most` of them at most.
+    async fn kept_jobs(&self, most: u32) -> Result<Vec<KeptJob>>;
+    /// Those of them whose bytes were not counted.
+    async fn uncounted_jobs(&self, most: u32) -> Result<Vec<KeptJob>>;
+    /// The files of each of those jobs have so many bytes, as long as it keeps that version.
+    async fn count_jobs(&self, jobs: Vec<(JobId, u64, u64)>) -> Result<()>;
+    /// Bytes of all that were counted.
+    async fn kept_bytes(&self) -> Result<u64>;
 
-    /// Adds a job with a cursor at block 0 of each lane, unless `key` was used before.
+    /// Adds a job with a cursor at block 0 of each lane, unless `key` was used before or a file is not there.
     async fn add_job(&self, job: NewJob, key: Option<IdempotencyKey>) -> Result<Added>;
     /// What became of an earlier job under that key, where there was one.
     async fn keyed(&self, key: &IdempotencyKey) -> Result<Option<Added>>;
     /// A job.
     async fn job(&self, id: &JobId) -> Result<Option<JobRow>>;
+    /// Those of these jobs that are not there.
+    async fn unknown_jobs(&self, jobs: Vec<JobId>) -> Result<Vec<JobId>>;
     /// A page of jobs, in the order that is asked for.
     async fn jobs(&self, filter: JobFilter) -> Result<Vec<JobRow>>;
     /// What a list says of each of those jobs beside its row, in the same order.

@@ -11,7 +11,7 @@ use ovtigre_proto::{
     status::{JobState, WorkerState},
 };
 use serde::{Deserialize, Serialize};
-use std::fmt;
+use std::{fmt, time::Duration};
 
 /// A batch of a job by its places in the schedule. Ordered as batches are handed out: all
 /// sequences of samples advance together, and one whole picture comes before the next.
@@ -66,6 +66,8 @@ pub struct SceneRow {
     pub report: SceneReport,
     /// When it came.
     pub created_at: Timestamp,
+    /// How long nobody has used it.
+    pub unused: Duration,
 }
 
 /// A job to be.
@@ -77,6 +79,8 @@ pub struct NewJob {
     pub name: String,
     /// Its scene.
     pub scene: BlobId,
+    /// Uploaded files that it needs: they are there as long as it is.
+    pub files: Vec<BlobId>,
     /// Higher goes first.
     pub priority: i32,
     /// The farm's own document.
@@ -107,6 +111,8 @@ pub enum Added {
     Before(JobId),
     /// Another request was made before under the same name.
     KeyTaken,
+    /// A file that it needs is not there.
+    Lacks(BlobId),
 }
 
 /// A job.

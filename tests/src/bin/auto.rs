@@ -112,7 +112,7 @@ fn compare(name: &str, glb: &[u8], asked: &Arguments) -> anyhow::Result<String> 
         methods: METHODS.into_iter().filter(makes_all).collect(),
     };
     let start = thread_seconds();
-    let tried = pilot(glb, None, &plan)?;
+    let (tried, _) = pilot(glb, None, &plan)?;
     let pilot_seconds = thread_seconds() - start;
 
     let small = settings(SIZE.width, SIZE.height, REPLICATES);

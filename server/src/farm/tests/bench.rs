@@ -53,7 +53,7 @@ async fn open(folder: &TempDir, rules: Rules) -> Arc<Farm> {
     Farm::open(store, blobs, inspect(), rules, Traces::default()).await.unwrap()
 }
 
-fn inspect() -> Inspect {
+pub(crate) fn inspect() -> Inspect {
     Inspect::new(|bytes| {
         if bytes.starts_with(b"bad") {
             return Err(crate::farm::error::fault("/meshes/0", "the mesh is bad"));
@@ -214,6 +214,11 @@ impl Bench {
     pub(crate) fn assert_only_a_picture(&self, job: &JobId) {
         let files = self.files(job);
         assert!(files.len() == 1 && files[0].starts_with("result-"), "{files:?}");
+    }
+
+    /// Where files are.
+    pub(crate) fn blobs(&self) -> std::path::PathBuf {
+        self.folder.path().join("blobs")
     }
 
     /// Files under `jobs/`.

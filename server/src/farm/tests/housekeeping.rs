@@ -1,15 +1,16 @@
 //! What is kept, and whether it is there.
 
 use super::bench::{Bench, Spread, rules};
-use crate::farm::{check::check, rules::Rules};
+use crate::farm::{check::check, keep::Kept, rules::Rules};
 use ovtigre_proto::status::JobState;
 use std::{fs, time::Duration};
 
 #[tokio::test(flavor = "multi_thread")]
 async fn jobs_that_are_over_are_kept_as_long_as_the_rules_say() {
-    for (kept, is_there) in
+    for (time, is_there) in
         [(None, true), (Some(Duration::from_hours(1)), true), (Some(Duration::ZERO), false)]
     {
+        let kept = Kept { time, bytes: None };
         let bench = Bench::new(Rules { kept, ..rules() }).await;
         let worker = bench.worker().await;
         let done = bench.job(4, |_| ()).await;

@@ -65,8 +65,8 @@ async fn trial(spreads: [Spread; 3]) -> Vec<WorkerState> {
 #[tokio::test(flavor = "multi_thread")]
 async fn who_brings_a_wrong_sum_is_put_aside_and_its_batches_are_rendered_again() {
     let (fine, aside) = (WorkerState::Active, WorkerState::Aside);
-    assert_eq!(trial([Spread::Still, Spread::Noisy, Spread::Noisy]).await, [aside, fine, fine]);
-    assert_eq!(trial([Spread::Noisy, Spread::Still, Spread::Noisy]).await, [fine, aside, fine]);
+    assert_eq!(Box::pin(trial([Spread::Still, Spread::Noisy, Spread::Noisy])).await, [aside, fine, fine]);
+    assert_eq!(Box::pin(trial([Spread::Noisy, Spread::Still, Spread::Noisy])).await, [fine, aside, fine]);
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -10,6 +10,27 @@ use ovtigre_proto::status::{JobState, WorkerState};
 use serde::{Serialize, de::DeserializeOwned};
 use std::{fmt::Display, str::FromStr, time::Duration};
 
+/// Columns by their names. Never `*`: PostgreSQL refuses a statement that it has prepared when its columns change, and a newer
+/// program adds some beside an older one.
+macro_rules! columns_of {
+    (job) => {
+        "sequence, id, name, scene, state, reason, version, priority, created_ms, started_ms, ended_ms, paused_ms, \
+         paused_since_ms, spec, progress, certified, manifest, settled, class"
+    };
+    (checkpoint) => {
+        "look, samples, wall_seconds, worker_seconds, rays, rms_error, relative_error, relative_error_upper, \
+         target_expected_at_seconds, doubt, layers"
+    };
+    (worker) => {
+        "sequence, id, name, threads, build, instruction_set, tags, state, joined_ms, seen_ms, batches_done, failures, \
+         rays_per_second, reason"
+    };
+    (token) => {
+        "id, name, role, hash, created_ms"
+    };
+}
+pub(super) use columns_of;
+
 /// Whole milliseconds.
 pub(super) fn millis(time: Duration) -> i64 {
     i64::try_from(time.as_millis()).unwrap_or(i64::MAX / 4)

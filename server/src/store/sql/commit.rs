@@ -1,7 +1,7 @@
 //! What was brought, and the curve.
 
 use super::{
-    column::{commit as commit_row, count, from_json, to_json},
+    column::{columns_of, commit as commit_row, count, from_json, to_json},
     connection::{Db, Row},
     merger::require,
     query::query,
@@ -96,7 +96,9 @@ pub(super) async fn layers(db: &mut Db, job: &JobId) -> Result<Vec<LayerError>> 
 
 /// A job's checkpoints in order.
 pub(super) async fn curve(db: &mut Db, job: &JobId) -> Result<Vec<CurveRow>> {
-    let rows = query("SELECT * FROM checkpoint WHERE job = $1 ORDER BY look").bind(job.as_str());
+    let rows =
+        query(concat!("SELECT ", columns_of!(checkpoint), " FROM checkpoint WHERE job = $1 ORDER BY look"))
+            .bind(job.as_str());
     db.all(rows).await?.iter().map(curve_row).collect()
 }
 

@@ -1,7 +1,7 @@
 //! What is taken back of a job's work, and what workers and callers are held to.
 
 use super::{
-    column::{batch, count, job_state, parse, time},
+    column::{batch, columns_of, count, job_state, parse, time},
     connection::{Db, Row},
     notice,
     query::query,
@@ -134,13 +134,18 @@ pub(super) async fn add_token(db: &mut Db, token: TokenRow) -> Result<()> {
 
 /// All tokens, the oldest first.
 pub(super) async fn tokens(db: &mut Db) -> Result<Vec<TokenRow>> {
-    let rows = db.all(query("SELECT * FROM token ORDER BY created_ms, id")).await?;
+    let rows =
+        db.all(query(concat!("SELECT ", columns_of!(token), " FROM token ORDER BY created_ms, id"))).await?;
     rows.iter().map(token_row).collect()
 }
 
 /// The token of a hash.
 pub(super) async fn token(db: &mut Db, hash: &BlobId) -> Result<Option<TokenRow>> {
-    let row = db.first(query("SELECT * FROM token WHERE hash = $1").bind(hash.as_str())).await?;
+    let row = db
+        .first(
+            query(concat!("SELECT ", columns_of!(token), " FROM token WHERE hash = $1")).bind(hash.as_str()),
+        )
+        .await?;
     row.as_ref().map(token_row).transpose()
 }
 

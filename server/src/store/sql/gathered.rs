@@ -62,9 +62,19 @@ fn place(job: &impl ToString, at: BatchKey) -> [Value; 4] {
 pub(super) fn of_jobs(jobs: &[JobId]) -> Query {
     let statement = over!(
         [0 job text],
-        "SELECT c.*, (SELECT count(DISTINCT worker) FROM lease WHERE lease.job = item.job) AS workers
+        "SELECT c.look, samples, wall_seconds, worker_seconds, rays, rms_error, relative_error, relative_error_upper,
+           target_expected_at_seconds, doubt, layers, (SELECT count(DISTINCT worker) FROM lease WHERE lease.job = item.job) AS workers
          FROM item LEFT JOIN checkpoint AS c ON c.job = item.job
          AND c.look = (SELECT max(look) FROM checkpoint AS d WHERE d.job = item.job) ORDER BY n"
+    );
+    bound(statement, jobs.iter().map(|job| json!([job.as_str()])).collect())
+}
+
+/// Those of these jobs that are not there.
+pub(super) fn not_there(jobs: &[JobId]) -> Query {
+    let statement = over!(
+        [0 job text],
+        "SELECT job FROM item WHERE NOT EXISTS (SELECT 1 FROM job WHERE job.id = item.job)"
     );
     bound(statement, jobs.iter().map(|job| json!([job.as_str()])).collect())
 }

@@ -1,38 +1,18 @@
-//! Scenes and jobs.
+//! Jobs.
 
 use super::{
-    column::{count, from_json, job_state, parse, time, to_json},
+    column::{columns_of, count, from_json, job_state, parse, time, to_json},
     connection::{Db, Row},
+    kept,
     merger::require,
     notice,
     query::query,
 };
 use crate::store::{
     error::Result,
-    row::{Added, IdempotencyKey, JobChange, JobHead, JobRow, NewJob, Progress, SceneRow, Settlement},
+    row::{Added, IdempotencyKey, JobChange, JobHead, JobRow, NewJob, Progress, Settlement},
 };
-use ovtigre_proto::{
-    id::{BlobId, JobId},
-    scene::SceneReport,
-    status::JobState,
-};
-
-/// Remembers an uploaded file.
-pub(super) async fn add_scene(db: &mut Db, report: SceneReport) -> Result<()> {
-    let insert = query(
-        "INSERT INTO scene (id, bytes, report, created_ms) VALUES ($1, $2, $3, $4) ON CONFLICT DO NOTHING",
-    );
-    let insert = insert.bind(report.id.as_str()).bind(report.bytes).bind(to_json(&report)?);
-    let now = db.now().await?;
-    db.execute(insert.bind(now)).await.map(drop)
-}
-
-/// An uploaded file.
-pub(super) async fn scene(db: &mut Db, id: &BlobId) -> Result<Option<SceneRow>> {
-    let row = query("SELECT report, created_ms FROM scene WHERE id = $1").bind(id.as_str());
-    let Some(row) = db.first(row).await? else { return Ok(None) };
-    Ok(Some(SceneRow { report: from_json(&row, "report")?, created_at: time(row.whole("created_ms")?)? }))
-}
+use ovtigre_proto::{id::JobId, status::JobState};
 
 /// What became of an earlier job under that key.
 pub(super) async fn keyed(db: &mut Db, key: &IdempotencyKey) -> Result<Option<Added>> {
@@ -42,13 +22,18 @@ pub(super) async fn keyed(db: &mut Db, key: &IdempotencyKey) -> Result<Option<Ad
     Ok(Some(if same { Added::Before(parse(&row, "job")?) } else { Added::KeyTaken }))
 }
 
-/// Adds a job with a cursor at block 0 of each lane, unless `key` was used before.
+/// Adds a job with a cursor at block 0 of each lane, unless `key` was used before or a file is not there.
 pub(super) async fn add(db: &mut Db, job: NewJob, key: Option<IdempotencyKey>) -> Result<Added> {
     let now = db.now().await?;
+    if let Some(key) = &key
+        && let Some(before) = keyed(db, key).await?
+    {
+        return Ok(before);
+    }
+    if let Some(file) = kept::need(db, &job.id, job.files).await? {
+        return Ok(Added::Lacks(file));
+    }
     if let Some(key) = key {
-        if let Some(before) = keyed(db, &key).await? {
-            return Ok(before);
-        }
         let IdempotencyKey { key, fingerprint } = key;
         let insert =
             query("INSERT INTO idempotency (key, fingerprint, job, created_ms) VALUES ($1, $2, $3, $4)");
@@ -76,14 +61,18 @@ pub(super) async fn add(db: &mut Db, job: NewJob, key: Option<IdempotencyKey>) -
 /// A job.
 pub(super) async fn get(db: &mut Db, id: &JobId) -> Result<Option<JobRow>> {
     let now = db.now().await?;
-    let row = db.first(query("SELECT * FROM job WHERE id = $1").bind(id.as_str())).await?;
+    let row = db
+        .first(query(concat!("SELECT ", columns_of!(job), " FROM job WHERE id = $1")).bind(id.as_str()))
+        .await?;
     row.map(|row| read(&row, now)).transpose()
 }
 
 /// Jobs that are not over or have no last form, the oldest first.
 pub(super) async fn unsettled(db: &mut Db) -> Result<Vec<JobRow>> {
     let now = db.now().await?;
-    let rows = db.all(query("SELECT * FROM job WHERE settled = 0 ORDER BY sequence")).await?;
+    let rows = db
+        .all(query(concat!("SELECT ", columns_of!(job), " FROM job WHERE settled = 0 ORDER BY sequence")))
+        .await?;
     rows.iter().map(|row| read(row, now)).collect()
 }
 
@@ -226,6 +215,7 @@ async fn forget(db: &mut Db, id: &JobId, kept: Kept) -> Result<()> {
 
 /// Forgets a job and all of it.
 pub(super) async fn remove(db: &mut Db, id: &JobId) -> Result<bool> {
+    kept::leave(db, id).await?;
     forget(db, id, Kept::Nothing).await?;
     Ok(db.execute(query("DELETE FROM job WHERE id = $1").bind(id.as_str())).await? > 0)
 }

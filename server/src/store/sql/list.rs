@@ -5,10 +5,10 @@
 //! leading columns are equal to something: what is like the place before comes first, then what is beyond.
 
 use super::{
-    column::{count, from_json},
+    column::{columns_of, count, from_json, parse},
     commit::curve_row,
     connection::Db,
-    gathered::of_jobs,
+    gathered::{not_there, of_jobs},
     job::read,
     query::{Query, both, query},
 };
@@ -23,7 +23,7 @@ use ovtigre_proto::{id::JobId, status::JobState};
 macro_rules! page {
     ($($condition:literal),+; $($order:literal),+) => {
         concat!(
-            "SELECT * FROM job WHERE ", $($condition,)+ " AND ($3 = '' OR state = $3)
+            "SELECT ", columns_of!(job), " FROM job WHERE ", $($condition,)+ " AND ($3 = '' OR state = $3)
              AND ($2 = '' OR lower(name) LIKE $2 ESCAPE '\\' OR lower(id) LIKE $2 ESCAPE '\\')
              ORDER BY ", $($order,)+ " LIMIT $1"
         )
@@ -141,6 +141,14 @@ fn pattern(text: &str) -> String {
         pattern.push(c.to_ascii_lowercase());
     }
     pattern + "%"
+}
+
+/// Those of these jobs that are not there.
+pub(super) async fn unknown(db: &mut Db, jobs: &[JobId]) -> Result<Vec<JobId>> {
+    if jobs.is_empty() {
+        return Ok(Vec::new());
+    }
+    db.all(not_there(jobs)).await?.iter().map(|row| parse(row, "job")).collect()
 }
 
 /// What a list says of each job beside its row, in the same order.

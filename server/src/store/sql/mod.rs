@@ -9,6 +9,7 @@ mod connection;
 mod control;
 mod gathered;
 mod job;
+mod kept;
 mod ledger;
 mod list;
 mod merger;
@@ -23,6 +24,7 @@ mod writer;
 use super::{
     Sharing, Store,
     error::{Result, StoreError},
+    kept::{KeptJob, UnfiledJob},
     list::{JobFilter, Standing},
     notice::NoticeRow,
     row::{
@@ -87,12 +89,63 @@ impl Store for Sql {
         self.sharing
     }
 
-    async fn add_scene(&self, report: SceneReport) -> Result<()> {
-        self.writer.write(|db| Box::pin(job::add_scene(db, report))).await
+    async fn add_scene(&self, report: SceneReport) -> Result<bool> {
+        self.writer.write(|db| Box::pin(kept::add_scene(db, report))).await
     }
 
     async fn scene(&self, id: &BlobId) -> Result<Option<SceneRow>> {
-        job::scene(&mut self.reader().await?, id).await
+        kept::scene(&mut self.reader().await?, id).await
+    }
+
+    async fn use_scene(&self, id: &BlobId) -> Result<bool> {
+        let id = id.clone();
+        self.writer.write(move |db| Box::pin(async move { kept::use_scene(db, &id).await })).await
+    }
+
+    async fn unused_scenes(&self, unused: Duration, most: u32) -> Result<Vec<BlobId>> {
+        kept::unused(&mut self.reader().await?, unused, most).await
+    }
+
+    async fn drop_scene(&self, id: &BlobId, unused: Duration) -> Result<bool> {
+        let id = id.clone();
+        self.writer.write(move |db| Box::pin(async move { kept::drop_scene(db, &id, unused).await })).await
+    }
+
+    async fn is_dropped(&self, id: &BlobId) -> Result<bool> {
+        kept::is_dropped(&mut self.reader().await?, id).await
+    }
+
+    async fn dropped_before(&self, time: Duration) -> Result<Vec<BlobId>> {
+        self.writer.write(move |db| Box::pin(kept::dropped_before(db, time))).await
+    }
+
+    async fn end_drop(&self, id: &BlobId) -> Result<()> {
+        let id = id.clone();
+        self.writer.write(move |db| Box::pin(async move { kept::end_drop(db, &id).await })).await
+    }
+
+    async fn unfiled(&self, most: u32) -> Result<Vec<UnfiledJob>> {
+        kept::unfiled(&mut self.reader().await?, most).await
+    }
+
+    async fn file(&self, jobs: Vec<(JobId, Vec<BlobId>)>) -> Result<()> {
+        self.writer.write(move |db| Box::pin(kept::file(db, jobs))).await
+    }
+
+    async fn kept_jobs(&self, most: u32) -> Result<Vec<KeptJob>> {
+        kept::jobs(&mut self.reader().await?, most).await
+    }
+
+    async fn uncounted_jobs(&self, most: u32) -> Result<Vec<KeptJob>> {
+        kept::uncounted(&mut self.reader().await?, most).await
+    }
+
+    async fn count_jobs(&self, jobs: Vec<(JobId, u64, u64)>) -> Result<()> {
+        self.writer.write(move |db| Box::pin(kept::count_jobs(db, jobs))).await
+    }
+
+    async fn kept_bytes(&self) -> Result<u64> {
+        kept::bytes(&mut self.reader().await?).await
     }
 
     async fn add_job(&self, job: NewJob, key: Option<IdempotencyKey>) -> Result<Added> {
@@ -109,6 +162,10 @@ impl Store for Sql {
 
     async fn jobs(&self, filter: JobFilter) -> Result<Vec<JobRow>> {
         list::list(&mut self.reader().await?, filter).await
+    }
+
+    async fn unknown_jobs(&self, jobs: Vec<JobId>) -> Result<Vec<JobId>> {
+        list::unknown(&mut self.reader().await?, &jobs).await
     }
 
     async fn standings(&self, jobs: &[JobId]) -> Result<Vec<Standing>> {
@@ -451,6 +508,42 @@ mod tests {
                 assert!(!sql.contains(word), "{}: {word}", migration.description);
             }
         }
+    }
+
+    #[tokio::test(flavor = "multi_thread")]
+    async fn columns_that_a_newer_program_adds_do_not_disturb_this_one() {
+        let Some(url) = schema("columns").await else { return };
+        let store = Sql::server(&url).await.unwrap();
+        let (worker, job): (WorkerId, JobId) = ("w".parse().unwrap(), "a".parse().unwrap());
+        store.add_worker(&worker, join()).await.unwrap();
+        store.add_job(contract::new_job("a"), None).await.unwrap();
+        let read = async || {
+            assert!(store.job(&job).await.unwrap().is_some());
+            assert_eq!(store.unsettled_jobs().await.unwrap().len(), 1);
+            assert_eq!(store.jobs(JobFilter { limit: 9, ..JobFilter::default() }).await.unwrap().len(), 1);
+            assert_eq!(store.standings(std::slice::from_ref(&job)).await.unwrap().len(), 1);
+            assert!(store.curve(&job).await.unwrap().is_empty());
+            assert_eq!(store.ledger(&job).await.unwrap().cursors.len(), 4);
+            assert!(store.worker(&worker).await.unwrap().is_some());
+            assert_eq!(store.workers(None, 9).await.unwrap().len(), 1);
+            assert!(store.tokens().await.unwrap().is_empty());
+            assert!(store.kept_jobs(9).await.unwrap().is_empty());
+            assert!(store.scene(&BlobId::of([1; 32])).await.unwrap().is_none());
+            assert!(store.due_notices(9, Duration::ZERO).await.unwrap().is_empty());
+        };
+        read().await;
+        let mut db = Source::server(&url).unwrap().connect().await.unwrap();
+        for add in [
+            "ALTER TABLE job ADD COLUMN later TEXT",
+            "ALTER TABLE worker ADD COLUMN later TEXT",
+            "ALTER TABLE token ADD COLUMN later TEXT",
+            "ALTER TABLE checkpoint ADD COLUMN later TEXT",
+            "ALTER TABLE scene ADD COLUMN later TEXT",
+            "ALTER TABLE notice ADD COLUMN later TEXT",
+        ] {
+            db.execute(query::query(add)).await.unwrap();
+        }
+        read().await;
     }
 
     #[tokio::test(flavor = "multi_thread")]

@@ -1,7 +1,10 @@
 //! Workers, and numbers for gauges.
 
 use super::{
-    column::{count, from_json, job_state, millis, parse, time, to_json, worker_state, worker_state_name},
+    column::{
+        columns_of, count, from_json, job_state, millis, parse, time, to_json, worker_state,
+        worker_state_name,
+    },
     connection::{Db, Row},
     query::query,
 };
@@ -43,21 +46,21 @@ pub(super) async fn set_state(db: &mut Db, id: &WorkerId, state: WorkerState) ->
 
 /// A worker.
 pub(super) async fn get(db: &mut Db, id: &WorkerId) -> Result<Option<WorkerRow>> {
-    let row = query(
-        "SELECT *, (SELECT count(*) FROM lease WHERE lease.worker = worker.id) AS leases,
+    let row = query(concat!(
+        "SELECT ", columns_of!(worker), ", (SELECT count(*) FROM lease WHERE lease.worker = worker.id) AS leases,
                 (SELECT lease.job FROM lease WHERE lease.worker = worker.id ORDER BY granted_ms LIMIT 1) AS job
-         FROM worker WHERE id = $1",
-    );
+         FROM worker WHERE id = $1"
+    ));
     db.first(row.bind(id.as_str())).await?.as_ref().map(read).transpose()
 }
 
 /// Workers, the newest first.
 pub(super) async fn list(db: &mut Db, before: Option<i64>, limit: u32) -> Result<Vec<(i64, WorkerRow)>> {
-    let rows = query(
-        "SELECT *, (SELECT count(*) FROM lease WHERE lease.worker = worker.id) AS leases,
+    let rows = query(concat!(
+        "SELECT ", columns_of!(worker), ", (SELECT count(*) FROM lease WHERE lease.worker = worker.id) AS leases,
                 (SELECT lease.job FROM lease WHERE lease.worker = worker.id ORDER BY granted_ms LIMIT 1) AS job
-         FROM worker WHERE sequence < $1 ORDER BY sequence DESC LIMIT $2",
-    );
+         FROM worker WHERE sequence < $1 ORDER BY sequence DESC LIMIT $2"
+    ));
     let rows = db.all(rows.bind(before.unwrap_or(i64::MAX)).bind(limit)).await?;
     rows.iter().map(|row| Ok((row.whole("sequence")?, read(row)?))).collect()
 }
