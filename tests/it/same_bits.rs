@@ -10,7 +10,7 @@ use ovtigre_core::{
     },
     radiosity::{fineness::Fineness, solution::Solution},
     render::{
-        batch::render,
+        batch::{Kernel, render, render_by},
         prepare::{Prepared, open},
         progress::Progress,
     },
@@ -252,4 +252,17 @@ fn scaling_and_moving_change_the_picture_no_more_than_its_error() {
 fn the_scene_that_comes_along_is_the_one_its_code_makes() {
     let file = std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/room.glb")).unwrap();
     assert!(file == ovtigre_tests::room::room(), "run: cargo run -p ovtigre-tests --bin make-scenes");
+}
+
+#[test]
+fn what_is_compiled_for_less_gives_the_bits_of_the_general_kernel() {
+    let glb = everything(1.0, 0.0);
+    for method in [Method::Path, Method::Light, Method::Bidirectional, Method::Photon] {
+        let settings = in_environment(Settings { method, ..settings(40, 30, 1) }, 0.2);
+        let scene = scene(&glb, &settings);
+        let block = Block { index: 2, start: 2, count: 2 };
+        let batch = Batch { region: settings.size.frame(), replicate: 0, block };
+        let by = |kernel| render_by(kernel, &scene, &settings, batch, &Progress::new()).unwrap();
+        assert_eq!(by(Kernel::Fitting), by(Kernel::General), "{method:?}");
+    }
 }

@@ -25,3 +25,4 @@ pub mod stability;
 pub mod stage;
 pub mod tended;
 pub mod textures;
+pub mod thread_time;

@@ -34,7 +34,7 @@ impl State for LightState {
 pub trait Throughput<S: State>: Clone {
     /// All in one state.
     fn in_state(state: S, weight: Rgb) -> Self;
-    /// Whether no accepted word begins like this.
+    /// Whether nothing can come of it: no accepted word begins like this, or nothing is carried.
     fn is_dead(&self) -> bool;
     /// Over all states.
     fn total(&self) -> Rgb;
@@ -59,7 +59,7 @@ impl<S: State> Throughput<S> for Whole {
 
     #[inline]
     fn is_dead(&self) -> bool {
-        false
+        self.0 == Vec3::ZERO
     }
 
     #[inline]
@@ -126,6 +126,12 @@ impl<S: State> Throughput<S> for ByState<S> {
                 }
             };
             match weight {
+                // Where letters lead to the same state they are added first, so that a language of one state rounds as `Whole` does.
+                Weight::Smooth(both)
+                    if state.after(language, Letter::Diffuse) == state.after(language, Letter::Glossy) =>
+                {
+                    go(Letter::Diffuse, both.total());
+                }
                 Weight::Smooth(Scattered { diffuse, glossy }) => {
                     go(Letter::Diffuse, diffuse);
                     go(Letter::Glossy, glossy);

@@ -13,6 +13,15 @@ use crate::render::sample::Sampling;
 use crate::render::{passes, splats, tile};
 use crate::settings::{Method, Settings};
 
+/// Which code renders a batch. The sums are the same, bit by bit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kernel {
+    /// Compiled for what is asked: it follows no letters where every path counts for one picture.
+    Fitting,
+    /// Compiled for any expressions and layers.
+    General,
+}
+
 /// A batch gave no sum.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum RenderError {
@@ -32,12 +41,23 @@ pub fn render(
     batch: Batch,
     progress: &Progress,
 ) -> Result<Sum, RenderError> {
+    render_by(Kernel::Fitting, prepared, settings, batch, progress)
+}
+
+/// The same by a kernel of choice, to compare them.
+pub fn render_by(
+    kernel: Kernel,
+    prepared: &Prepared,
+    settings: &Settings,
+    batch: Batch,
+    progress: &Progress,
+) -> Result<Sum, RenderError> {
     assert!(batch.region.is_in(settings.size), "the batch's region is not in the frame");
     let scene = &prepared.scene;
     let rules = Rules::new(scene, settings, batch.region.pixels())?;
     let radiosity = prepared.radiosity.as_deref();
     let sampling = Sampling { scene, radiosity, settings, rules: &rules, batch };
-    if rules.is_everything() {
+    if kernel == Kernel::Fitting && rules.is_everything() {
         run::<Everything>(&sampling, progress)
     } else {
         run::<Filtered>(&sampling, progress)

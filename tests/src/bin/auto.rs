@@ -28,6 +28,7 @@ use ovtigre_tests::{
     room::room,
     scenes::{cornell, two_rooms},
     showcase::{caustic, lamp_behind_glass},
+    thread_time::thread_seconds,
 };
 use std::{fmt::Write as _, io::Write as _};
 
@@ -205,11 +206,4 @@ fn table(
         100.0 * pilot.share,
     )?;
     Ok(out)
-}
-
-/// Seconds that this thread has been on a processor.
-fn thread_seconds() -> f64 {
-    let text = std::fs::read_to_string("/proc/thread-self/schedstat").expect("Linux, with /proc mounted");
-    let nanoseconds: f64 = text.split_whitespace().next().and_then(|n| n.parse().ok()).expect("a number");
-    nanoseconds * 1e-9
 }

@@ -8,6 +8,7 @@ use ovtigre_core::settings::Settings;
 use ovtigre_tests::{
     lamps::{Hall, lamps},
     picture::{rendered_of, scene, settings},
+    thread_time::thread_seconds,
 };
 use std::io::Write as _;
 
@@ -100,11 +101,4 @@ fn row(n: u32, hall: Hall, seconds: f64) -> String {
         "| {hall:?} | {n} | {:.4} | {:.4} | {a:.2} | {b:.2} | {rays:.2} | {time:.2} | {by_rays:.2} |",
         power.error, tree.error
     )
-}
-
-/// Seconds that this thread has been on a processor.
-fn thread_seconds() -> f64 {
-    let text = std::fs::read_to_string("/proc/thread-self/schedstat").expect("Linux, with /proc mounted");
-    let nanoseconds: f64 = text.split_whitespace().next().and_then(|n| n.parse().ok()).expect("a number");
-    nanoseconds * 1e-9
 }

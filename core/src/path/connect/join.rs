@@ -40,12 +40,12 @@ pub fn join<S: Throughput<EyeState>, L: Throughput<LightState>>(
     let Some(direction) = towards.try_normalize() else { return };
     let (value, forward) = vertex.evaluate(direction, Transport::Radiance);
     let eye = walk.carried.scattered(&rules.language, Weight::Smooth(value));
-    if eye.is_dead() || eye.total() == Vec3::ZERO {
+    if eye.total() == Vec3::ZERO {
         return;
     }
     let (value, backward) = light.vertex.evaluate(-direction, Transport::Importance);
     let from_light = light.carried.scattered(&rules.language, Weight::Smooth(value));
-    if from_light.is_dead() || from_light.total() == Vec3::ZERO {
+    if from_light.total() == Vec3::ZERO {
         return;
     }
     let end = light.vertex.at.arrive(vertex.at.position);

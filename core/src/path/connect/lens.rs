@@ -34,7 +34,7 @@ pub fn to_lens<E: Throughput<EyeState>, L: Throughput<LightState>>(
     let Some(seen) = walk.view().see(vertex.at.position, lens) else { return };
     let (value, backward) = vertex.evaluate(seen.direction, Transport::Importance);
     let light = walk.carried.scattered(&rules.language, Weight::Smooth(value));
-    if light.is_dead() || light.total() == Vec3::ZERO {
+    if light.total() == Vec3::ZERO {
         return;
     }
     let passes = unblocked::seen(scene, vertex, &walk.media, seen.end, tally);

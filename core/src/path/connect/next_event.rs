@@ -36,7 +36,7 @@ pub fn next_event<S: Throughput<EyeState>, L: Throughput<LightState>>(
     let Some(start) = rules.language.light_start(rules.tag(light)) else { return };
     let (value, bsdf_pdf) = vertex.evaluate(event.direction, Transport::Radiance);
     let eye = walk.carried.scattered(&rules.language, Weight::Smooth(value));
-    if eye.is_dead() || eye.total() == Vec3::ZERO {
+    if eye.total() == Vec3::ZERO {
         return;
     }
     let passes = match rules.shadows {
