@@ -14,6 +14,7 @@ use crate::render::batch::{RenderError, render};
 use crate::render::prepare::{PrepareError, Prepared, prepare};
 use crate::render::progress::Progress;
 use crate::settings::{Method, Settings};
+use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -262,15 +263,16 @@ impl Trying<'_> {
 
     /// Appends a block to the first `lanes` replicates of a method that do not have it.
     fn append(&mut self, method: usize, lanes: u32, block: Block) -> Result<(), RenderError> {
+        let (prepared, region) = (self.prepared, self.region);
         let (settings, replicates) = &mut self.all[method];
-        for prefix in replicates.iter_mut().take(lanes as usize) {
-            if prefix.blocks() == block.index {
-                let batch = Batch { region: self.region, replicate: prefix.replicate(), block };
-                let sum = render(self.prepared, settings, batch, &Progress::new())?;
-                prefix.append(&sum).expect("blocks come in order");
-            }
-        }
-        Ok(())
+        // A picture this small has hardly more tiles than threads: replicates, which do not know each other, keep them busy.
+        let lanes = replicates.par_iter_mut().take(lanes as usize);
+        lanes.filter(|prefix| prefix.blocks() == block.index).try_for_each(|prefix| {
+            let batch = Batch { region, replicate: prefix.replicate(), block };
+            let sum = render(prepared, settings, batch, &Progress::new())?;
+            prefix.append(&sum).expect("blocks come in order");
+            Ok(())
+        })
     }
 
     fn rays(&self, method: usize) -> u64 {
