@@ -1,7 +1,8 @@
 //! What each kernel that is compiled for less than everything gains over the general one:
 //! `cargo bench -p ovtigre-tests --bench kernels`, the table of docs/PERFORMANCE.md.
 //!
-//! Both render the same batch in turns; time is that of one thread on a processor, and the median of the rounds counts.
+//! Both render the same batch in turns; time is that of one thread on a processor over all rounds, as the system counts it in steps
+//! of some milliseconds.
 
 use ovtigre_core::{
     film::batch::{Batch, Block},
@@ -49,19 +50,16 @@ fn measure(glb: &[u8], method: Method) -> [f64; 2] {
     let block = Block { index: 3, start: 4, count: 4 };
     let batch = Batch { region: settings.size.frame(), replicate: 0, block };
     let samples = settings.size.pixels() as f64 * f64::from(batch.block.count);
-    let mut seconds = [Vec::new(), Vec::new()];
+    let mut seconds = [0.0; 2];
     for _ in 0..ROUNDS {
-        for (kernel, all) in [Kernel::General, Kernel::Fitting].into_iter().zip(&mut seconds) {
+        for (kernel, whole) in [Kernel::General, Kernel::Fitting].into_iter().zip(&mut seconds) {
             let start = thread_seconds();
             let sum = render_by(kernel, &scene, &settings, batch, &Progress::new());
-            all.push(thread_seconds() - start);
+            *whole += thread_seconds() - start;
             sum.expect("nobody stops it");
         }
     }
-    seconds.map(|mut all| {
-        all.sort_by(f64::total_cmp);
-        samples / all[ROUNDS / 2]
-    })
+    seconds.map(|whole| samples * ROUNDS as f64 / whole)
 }
 
 #[expect(clippy::print_stdout, reason = "a benchmark's result")]

@@ -56,8 +56,20 @@ fn in_a_farm(scene: &std::path::Path, samples: u32) -> f64 {
     let out = scene.with_extension("exr");
     let samples = samples.to_string();
     let (scene, out) = (scene.to_str().expect("UTF-8"), out.to_str().expect("UTF-8"));
-    let output =
-        run(["render", scene, "-o", out, "--size", "480x270", "--samples", &samples, "--workers", "1"]);
+    let output = run([
+        "render",
+        scene,
+        "-o",
+        out,
+        "--size",
+        "480x270",
+        "--samples",
+        &samples,
+        "--workers",
+        "1",
+        "--method",
+        "path",
+    ]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     start.elapsed().as_secs_f64()
 }
