@@ -12,6 +12,7 @@ use ovtigre_tests::{
 use serde_json::{Value, json};
 use std::{
     fs,
+    io::Write as _,
     path::{Path, PathBuf},
 };
 
@@ -215,4 +216,35 @@ fn a_job_is_left(browser: &Browser, farm: &Farm, job: &str) {
     }
     browser.write("body", "/");
     browser.until("document.activeElement.type === 'search'");
+}
+
+/// The folder of `moving` in one file, as an archiver packs it.
+fn packed(folder: &Path) -> PathBuf {
+    let scene = moving(folder);
+    let file = folder.join("packed.zip");
+    let mut zip = zip::ZipWriter::new(fs::File::create(&file).unwrap());
+    for name in ["moving.gltf", "data/moving.bin", "notes.txt"] {
+        zip.start_file(format!("my scene/{name}"), zip::write::SimpleFileOptions::default()).unwrap();
+        zip.write_all(&fs::read(scene.join(name)).unwrap()).unwrap();
+    }
+    zip.finish().unwrap();
+    file
+}
+
+#[test]
+fn a_dropped_zip_is_previewed_before_anybody_renders_it() {
+    let Some(browser) = Browser::open("dropping a zip") else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let farm = Farm::start(&folder.path().join("farm"));
+    browser.go(&farm.url);
+    browser.press("New job");
+    browser.let_go(".drop", &[&packed(folder.path())]);
+    browser.until("document.querySelector('.told').textContent === 'packed.zip was sent.'");
+    assert!(text_of(&browser, ".facts").contains("Triangles40"), "{}", text_of(&browser, ".facts"));
+    browser.rewrite("#f-size", "240");
+    browser.until("document.querySelector('.verdict .facts')?.textContent.includes('240 × 135')");
+    browser.until("!document.querySelector('.send button').disabled");
+    browser.press("Render");
+    browser.until("document.querySelector('.stage')?.ariaLabel.startsWith('A preview of')");
+    seen(&browser, "job-preview");
 }
