@@ -126,7 +126,8 @@ impl<S: State> Throughput<S> for ByState<S> {
                 }
             };
             match weight {
-                // Where letters lead to the same state they are added first, so that a language of one state rounds as `Whole` does.
+                // Where letters lead to the same state they are added first, so that a language of one state rounds as
+                // `Whole` does.
                 Weight::Smooth(both)
                     if state.after(language, Letter::Diffuse) == state.after(language, Letter::Glossy) =>
                 {

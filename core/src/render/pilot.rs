@@ -189,8 +189,8 @@ fn work(method: Method, rays: u64, samples: f64) -> f64 {
     a_ray * rays as f64 + a_sample * samples
 }
 
-/// Renders the pilot of a job, and gives the picture of it by the method that is taken. `environment` holds the bytes of the image that the settings name, if they do. Runs on the current
-/// rayon pool; the same arguments give the same pilot on any number of threads.
+/// Renders the pilot of a job, and gives the picture of it by the method that is taken. `environment` holds the bytes of the image that
+/// the settings name, if they do. Runs on the current rayon pool; the same arguments give the same pilot on any number of threads.
 pub fn pilot(
     bytes: impl Into<Arc<[u8]>>,
     environment: Option<&[u8]>,

@@ -8,6 +8,9 @@ use std::collections::BTreeSet;
 /// What light from infinitely far goes by.
 pub const ENVIRONMENT: &str = "environment";
 
+/// Places of emitting parts whose names are looked at, at most: a mesh of many parts may stand at many places.
+const PLACES_MAX: usize = 1 << 22;
+
 /// Names by which `L'name'` takes the light of a scene.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LightNames {
@@ -21,12 +24,14 @@ impl LightNames {
     /// Those of a scene's own lights.
     pub fn of(scene: &SceneData) -> Self {
         let mut names = Self::default();
-        let emitting: Vec<_> = scene.meshes.iter().map(|mesh| emitting(scene, mesh)).collect();
-        for instance in &scene.instances {
-            for (part, material) in &emitting[instance.mesh.index()] {
-                let node = if instance.name.is_empty() { part } else { &*instance.name };
-                names.add([node, material]);
-            }
+        let emits: Vec<bool> = scene.materials.iter().map(Material::emits).collect();
+        let emitting: Vec<_> = scene.meshes.iter().map(|mesh| emitting(scene, &emits, mesh)).collect();
+        let all = scene.instances.iter().flat_map(|instance| {
+            emitting[instance.mesh.index()].iter().map(move |parts| (&*instance.name, parts))
+        });
+        for (instance, (part, material)) in all.take(PLACES_MAX) {
+            let node = if instance.is_empty() { part } else { instance };
+            names.add([node, material]);
         }
         scene.punctual.iter().for_each(|light| names.add([&light.name]));
         if scene.environment.is_some() || !scene.is_lit() {
@@ -46,8 +51,7 @@ impl LightNames {
 }
 
 /// Names of the parts and the materials of a mesh that emit, each pair once.
-fn emitting<'a>(scene: &'a SceneData, mesh: &'a Mesh) -> BTreeSet<(&'a str, &'a str)> {
-    let emits: Vec<bool> = scene.materials.iter().map(Material::emits).collect();
+fn emitting<'a>(scene: &'a SceneData, emits: &[bool], mesh: &'a Mesh) -> BTreeSet<(&'a str, &'a str)> {
     let of = |(triangle, material): (usize, &MaterialId)| {
         let name = &*scene.materials[material.index()].name;
         emits[material.index()].then(|| (mesh.part_name(triangle as u32), name))

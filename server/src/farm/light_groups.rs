@@ -49,7 +49,7 @@ pub(super) fn expanded(request: JobRequest, scene: &SceneContents) -> Result<Job
     }
     let mut taken = BTreeSet::new();
     let layers = names.iter().map(|name| format!("{}={}", layer_name(name, &mut taken), of(&paths, name)));
-    let mut request = request.clone();
+    let mut request = request;
     request.layers.splice(place..=place, layers.collect::<Vec<_>>());
     Ok(request)
 }
