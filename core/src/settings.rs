@@ -45,6 +45,27 @@ pub struct Settings {
     pub seed: u64,
     /// Number of independently scrambled sequences.
     pub replicates: u32,
+    /// Which pixels get how many samples.
+    #[serde(default, skip_serializing_if = "Distribution::is_uniform")]
+    pub sampling: Distribution,
+}
+
+/// Which pixels get how many samples.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Distribution {
+    /// All the same.
+    #[default]
+    Uniform,
+    /// More where they lessen the error more.
+    Adaptive,
+}
+
+impl Distribution {
+    /// Whether all get the same.
+    pub fn is_uniform(&self) -> bool {
+        *self == Self::Uniform
+    }
 }
 
 /// Which camera.
@@ -67,6 +88,9 @@ pub enum Method {
     Light,
     /// Both, joined everywhere.
     Bidirectional,
+    /// Paths from the eye, with next event; what surfaces that are more than diffuse make of light that comes straight from its
+    /// source, also by paths from the lights, with next event to the lens.
+    Caustics,
     /// Paths from the eye to a map of photons.
     Photon,
     /// Finite elements, for diffuse paths.
@@ -80,6 +104,7 @@ impl Method {
             Self::Path => "path",
             Self::Light => "light",
             Self::Bidirectional => "bidirectional",
+            Self::Caustics => "caustics",
             Self::Photon => "photon",
             Self::Radiosity => "radiosity",
         }
@@ -97,7 +122,7 @@ impl Method {
 
     /// Whether a sample of one pixel can add light to any other, so that a batch is always the whole picture.
     pub fn splats(self) -> bool {
-        matches!(self, Self::Light | Self::Bidirectional | Self::Photon)
+        matches!(self, Self::Light | Self::Bidirectional | Self::Caustics | Self::Photon)
     }
 }
 

@@ -7,7 +7,7 @@ use crate::{
 };
 use ovtigre_core::{
     film::size::{Region, Size},
-    settings::Shadows,
+    settings::{Distribution, Shadows},
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -90,6 +90,9 @@ pub struct JobRequest {
     /// Whether direct light is blocked.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shadows: Option<Shadows>,
+    /// Which pixels get how many samples.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sampling: Option<Distribution>,
     /// Chooses the random sequences.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub seed: Option<u64>,
@@ -129,6 +132,8 @@ pub enum MethodRequest {
     Light,
     /// Both, joined.
     Bidirectional,
+    /// Paths from the eye, and caustics also from the lights.
+    Caustics,
     /// Photon map.
     Photon,
     /// Finite elements.

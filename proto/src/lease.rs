@@ -1,7 +1,10 @@
 //! What workers and the farm say to each other.
 
 use crate::id::{BlobId, JobId, LeaseId, WorkerId};
-use ovtigre_core::{film::batch::Batch, settings::Settings};
+use ovtigre_core::{
+    film::{allocation::Allocation, batch::Batch},
+    settings::Settings,
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -89,6 +92,9 @@ pub struct Lease {
     /// where it is brought to the farm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub upload: Option<String>,
+    /// How many of the batch's samples each pixel gets, where they are not all alike.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub allocation: Option<Allocation>,
 }
 
 /// What became of an uploaded sum.

@@ -8,7 +8,10 @@ use crate::{
 };
 use jiff::Timestamp;
 use ovtigre_core::{
-    film::size::Region, path::reach::Unreachable, radiosity::report::RadiosityReport, render::pilot::Pilot,
+    film::{allocation::Allocations, size::Region},
+    path::reach::Unreachable,
+    radiosity::report::RadiosityReport,
+    render::pilot::Pilot,
     settings::Settings,
 };
 use schemars::JsonSchema;
@@ -124,6 +127,10 @@ pub struct JobStatus {
     /// Where the method is `radiosity` and a sum has come: how the scene was solved, with the residual of every iteration. Not in lists.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub radiosity: Option<RadiosityReport>,
+    /// Where samples are adaptive, once that is decided: how they are allocated, for replicates of even number and of odd
+    /// number. Not in lists.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub allocations: Option<Allocations>,
     /// What it needs of the scene and the program, and what it leaves out.
     #[serde(default)]
     pub needs: Needs,

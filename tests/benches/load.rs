@@ -1,5 +1,5 @@
 //! How much one server takes: many workers over real HTTP that bring made-up sums of 8×8 pixels, at a steady rate of exchanges;
-//! then a long list of jobs that are over, page by page, in two orders, with their checkpoints.
+//! then a long list of jobs that are over, page by page, in four orders, with their checkpoints.
 //!
 //! `./tests/services cargo bench -p ovtigre-tests --bench load -- [WORKERS [SECONDS [EXCHANGES A SECOND [JOBS LISTED]]]]`, with
 //! 1000, 60, 600 and 100000 where nothing is said; over a file and, where `tests/services` has started it, over PostgreSQL.
@@ -77,12 +77,14 @@ fn partial(lease: &Lease) -> Vec<u8> {
         planes: vec![vec![[lease.batch.block.count as f32; 3]; lease.batch.region.pixels()]],
         invalid: InvalidSamples::default(),
         rays: 1,
+        tile_rays: Vec::new(),
     };
     let attributes = PartialAttributes {
         job: lease.job.to_string(),
         scene: lease.scene.to_string(),
         method: lease.settings.method.name().to_owned(),
         solution: None,
+        allocation: None,
     };
     write_partial(&sum, lease.settings.size, &attributes)
 }
@@ -186,7 +188,7 @@ async fn copy_jobs(database: Result<&str, &Path>, load: Load) {
     let listed = load.listed;
     let copies = [
         format!(
-            "INSERT INTO job (id, {columns}) SELECT 'c' || n, {columns} FROM n, (SELECT * FROM job WHERE id = ({one})) AS one"
+            "INSERT INTO job (id, error_ppb, {columns}) SELECT 'c' || n, n, {columns} FROM n, (SELECT * FROM job WHERE id = ({one})) AS one"
         ),
         format!(
             "INSERT INTO checkpoint (job, {looks}) SELECT 'c' || n, {looks} FROM n, checkpoint WHERE job = ({one})"
@@ -261,7 +263,7 @@ async fn measure(name: &str, place: &Path, flags: &[&str], database: Option<&str
     let since = Instant::now();
     let farm = Farm::start_with(place, flags);
     print(&format!("  started over {} jobs in {:.1} s", load.listed, since.elapsed().as_secs_f64()));
-    for sort in ["-created", "name"] {
+    for sort in ["-created", "name", "error", "-workers"] {
         list(&farm, sort).await;
     }
 }

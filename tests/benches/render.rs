@@ -53,12 +53,19 @@ fn merge(c: &mut Criterion) {
     let size = Size { width: 1280, height: 720 };
     let batch = Schedule::new(size.frame(), 1, 1, 4).batch(0, 0, 0).expect("a first batch");
     let plane = (0..size.frame().pixels()).map(|i| [i as f32, 0.5, 1e-3 * i as f32]).collect();
-    let sum = Sum { batch, planes: vec![plane], invalid: InvalidSamples::default(), rays: 1 };
+    let sum = Sum {
+        batch,
+        planes: vec![plane],
+        invalid: InvalidSamples::default(),
+        rays: 1,
+        tile_rays: Vec::new(),
+    };
     let says = PartialAttributes {
         job: "j".to_owned(),
         scene: "s".to_owned(),
         method: "path".to_owned(),
         solution: None,
+        allocation: None,
     };
     let bytes = write_partial(&sum, size, &says);
     group.throughput(Throughput::Bytes(bytes.len() as u64));

@@ -7,7 +7,7 @@ use ovtigre_core::{
 use ovtigre_tests::{
     picture::settings,
     program::{Farm, run},
-    scenes::cornell,
+    scenes::{cornell, two_rooms},
     showcase::{caustic, lamp_behind_glass},
 };
 use serde_json::Value;
@@ -30,7 +30,7 @@ fn tried(glb: &[u8], plan: &Plan, threads: usize) -> Pilot {
 }
 
 const ALL: [Method; 3] = [Method::Path, Method::Bidirectional, Method::Light];
-const TWO: [Method; 2] = [Method::Path, Method::Bidirectional];
+const THREE: [Method; 3] = [Method::Path, Method::Bidirectional, Method::Caustics];
 
 #[test]
 fn each_scene_gets_the_method_that_is_good_at_it() {
@@ -39,16 +39,26 @@ fn each_scene_gets_the_method_that_is_good_at_it() {
     let diffuse = Plan { chance: Chance::Never, ..job(&ALL) };
     let found = tried(&cornell(), &diffuse, 2);
     assert_eq!(found.method, Method::Path, "{found:?}");
+    let found = tried(&two_rooms(), &diffuse, 2);
+    assert_eq!(found.method, Method::Bidirectional, "{found:?}");
     for glb in [caustic(), lamp_behind_glass()] {
-        let found = tried(&glb, &job(&TWO), 2);
-        assert_eq!(found.method, Method::Bidirectional, "{found:?}");
+        let found = tried(&glb, &job(&THREE), 2);
+        assert_eq!(found.method, Method::Caustics, "{found:?}");
         assert!(found.share <= 0.02, "{found:?}");
     }
 }
 
 #[test]
+fn what_is_not_tried_looks_for_light_that_is_met_by_chance() {
+    let small = |chance: Chance, methods: &[Method]| Plan { chance, ..plan(methods, 8) };
+    assert_eq!(small(Chance::Sometimes, &THREE).untried(), Method::Caustics);
+    assert_eq!(small(Chance::Sometimes, &THREE[..2]).untried(), Method::Path);
+    assert_eq!(small(Chance::Never, &ALL).untried(), Method::Path);
+}
+
+#[test]
 fn a_pilot_is_the_same_on_any_number_of_threads() {
-    let (glb, plan) = (caustic(), plan(&TWO, 32));
+    let (glb, plan) = (caustic(), plan(&THREE, 64));
     assert_eq!(tried(&glb, &plan, 1), tried(&glb, &plan, 3));
 }
 
@@ -75,7 +85,7 @@ fn report(folder: &Path, name: &str, flags: &[&str]) -> Value {
     let scene = folder.join("scene.glb").to_str().unwrap().to_owned();
     let (picture, report) = (path("exr"), path("json"));
     let common =
-        ["--size", "96x54", "--samples", "64", "--workers", "1", "-o", &picture, "--report", &report];
+        ["--size", "96x54", "--samples", "256", "--workers", "1", "-o", &picture, "--report", &report];
     let done = run([&["render", &scene], &common[..], flags].concat());
     let said = String::from_utf8(done.stderr).unwrap();
     assert!(done.status.success(), "{said}");
@@ -91,10 +101,10 @@ fn what_is_chosen_is_what_asking_for_it_gives() {
     fs::write(folder.path().join("scene.glb"), caustic()).unwrap();
     let chosen = report(folder.path(), "chosen", &[]);
     let job = &chosen["job"];
-    assert_eq!(job["method"], "bidirectional", "{}", job["pilot"]);
-    assert_eq!(job["pilot"]["trials"].as_array().unwrap().len(), 2, "light leaves out paths here");
+    assert_eq!(job["method"], "caustics", "{}", job["pilot"]);
+    assert_eq!(job["pilot"]["trials"].as_array().unwrap().len(), 3, "light leaves out paths here");
     assert!(job["method_reason"].as_str().unwrap().contains("path"), "{}", job["method_reason"]);
-    let asked = report(folder.path(), "asked", &["--method", "bidirectional"]);
+    let asked = report(folder.path(), "asked", &["--method", "caustics"]);
     assert_eq!((&asked["job"]["method_reason"], &asked["job"]["pilot"]), (&"asked for".into(), &Value::Null));
     let [a, b] = ["chosen.exr", "asked.exr"].map(|name| folder.path().join(name));
     let compared =
@@ -115,7 +125,7 @@ async fn the_pilot_is_seen_before_the_first_samples() {
     let scene = folder.path().join("scene.glb");
     fs::write(&scene, cornell()).unwrap();
     let farm = Farm::start(&folder.path().join("data"));
-    let asked = ["submit", scene.to_str().unwrap(), "--size", "96x96", "--samples", "64"];
+    let asked = ["submit", scene.to_str().unwrap(), "--size", "96x96", "--samples", "128"];
     let id = tokio::task::block_in_place(|| farm.client(&asked)).trim().to_owned();
     let job = tokio::task::block_in_place(|| farm.job(&id));
     let size = &job["pilot"]["size"];
@@ -124,6 +134,11 @@ async fn the_pilot_is_seen_before_the_first_samples() {
     assert_eq!((status, preview.as_deref()), (200, Some(&*size)));
     let preview = image::load_from_memory(&png).unwrap().to_rgb8();
     assert_eq!(preview.dimensions(), (96, 96));
+    // A thumbnail of it is as large as one of the picture will be.
+    let (_, again, png) = seen(&farm, &id, "image.png?width=40").await;
+    assert_eq!(again.as_deref(), Some(&*size));
+    let small = image::load_from_memory(&png).unwrap().to_rgb8();
+    assert_eq!(small.dimensions(), (32, 32));
     assert_eq!(seen(&farm, &id, "image.exr").await.0, 404, "a preview is no result");
     assert_eq!(seen(&farm, &id, "image.png?layer=error").await.0, 404, "its error is not that of the job");
 
@@ -133,7 +148,7 @@ async fn the_pilot_is_seen_before_the_first_samples() {
     let (status, none, png) = seen(&farm, &id, "image.png").await;
     assert_eq!((status, none), (200, None));
     let picture = image::load_from_memory(&png).unwrap().to_rgb8();
-    // Both show the same: in blocks of 24 pixels, which are three of the preview's, what is red on the left is red, and green is on the right.
+    // Both show the same: in blocks of 24 pixels, which are four of the preview's, what is red on the left is red, and green is on the right.
     let block = |image: &image::RgbImage, x: u32| {
         let all = (0..24 * 24).map(|i| image.get_pixel(x + i % 24, 36 + i / 24).0);
         all.fold([0_u32; 3], |sum, pixel| [0, 1, 2].map(|c| sum[c] + u32::from(pixel[c])))
@@ -142,5 +157,9 @@ async fn the_pilot_is_seen_before_the_first_samples() {
     for x in [0, 36, 72] {
         let (a, b) = (block(&preview, x), block(&picture, x));
         assert!(a.iter().zip(b).all(|(a, b)| a.abs_diff(b) < 12), "at {x}: {a:?} and {b:?}");
+        let thumb = (0..64).map(|i| small.get_pixel(x / 3 + i % 8, 12 + i / 8).0);
+        let thumb = thumb.fold([0_u32; 3], |sum, pixel| [0, 1, 2].map(|c| sum[c] + u32::from(pixel[c])));
+        let thumb = thumb.map(|sum| sum / 64);
+        assert!(a.iter().zip(thumb).all(|(a, b)| a.abs_diff(b) < 12), "at {x}: {a:?} and {thumb:?}");
     }
 }

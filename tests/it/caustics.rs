@@ -52,7 +52,7 @@ impl Window {
 
     /// Mean of the radiance of a floor with an irradiance over a pixel, one of `columns` × `rows`.
     fn radiance(self, [x, y]: [u32; 2], [columns, rows]: [u32; 2], irradiance: impl Fn(DVec3) -> f64) -> f64 {
-        const STEPS: u32 = 16;
+        const STEPS: u32 = 64;
         let sum: f64 = (0..STEPS * STEPS)
             .map(|i| {
                 let part = |pixel: u32, i: u32, count: u32| {
@@ -128,7 +128,8 @@ fn a_plane_mirror_shows_a_second_point_light() {
     };
     let direct = |p: DVec3| INTENSITY * irradiance::of_point(light - p);
     let small = settings(4, 4, 16);
-    for (method, samples) in [(Method::Light, 2048), (Method::Bidirectional, 1024)] {
+    for (method, samples) in [(Method::Light, 2048), (Method::Bidirectional, 1024), (Method::Caustics, 1024)]
+    {
         let alone = rendered(&glb, &by(method, "LS_MDE", &small), samples);
         window.assert(&alone, 0, [0.006, 0.03], truth, &format!("{method:?}"));
         let mut with_layers = by(method, "L.{0,3}E", &small);
@@ -176,7 +177,7 @@ fn photons_reach_a_caustic_that_is_seen_in_a_mirror() {
     assert!(error < 0.004 * mean, "the error {error} of {found} is too large to find a bias");
     // As above, ρ² ΔE / 8 is at most 1.4 % of E.
     assert!((found - mean).abs() <= 0.014 * mean + 4.5 * error, "{found} ± {error}, not {mean}");
-    for method in [Method::Path, Method::Light, Method::Bidirectional] {
+    for method in [Method::Path, Method::Light, Method::Bidirectional, Method::Caustics] {
         let (nothing, _) = rendered(&glb, &by(method, "LS_MDS_ME", &settings(4, 4, 16)), 64).mean();
         assert_eq!(nothing, 0.0, "{method:?}");
     }
@@ -193,7 +194,8 @@ fn a_plane_mirror_shows_a_second_lamp() {
     });
     let truth = |p: DVec3| 2.0 * irradiance::of_polygon(&corners.iter().map(|c| *c - p).collect::<Vec<_>>());
     let small = settings(4, 4, 16);
-    for (method, samples) in [(Method::Path, 2048), (Method::Light, 4096), (Method::Bidirectional, 1024)] {
+    let light = [(Method::Light, 4096), (Method::Bidirectional, 1024), (Method::Caustics, 1024)];
+    for (method, samples) in [(Method::Path, 2048)].into_iter().chain(light) {
         let alone = rendered(&glb, &by(method, "LS_MDE", &small), samples);
         window.assert(&alone, 0, [0.008, 0.06], truth, &format!("{method:?}"));
     }
@@ -227,7 +229,8 @@ fn a_flat_interface_refracts_as_snell_and_fresnel_say() {
     window.camera(&mut glb, 0.5);
     let glb = glb.finish();
     let truth = |p: DVec3| INTENSITY * refracted(eta, a, b, p.with_y(0.0).length());
-    for (method, samples) in [(Method::Light, 4096), (Method::Bidirectional, 2048)] {
+    for (method, samples) in [(Method::Light, 4096), (Method::Bidirectional, 2048), (Method::Caustics, 2048)]
+    {
         let alone = rendered(&glb, &by(method, "LS_MDE", &settings(8, 2, 16)), samples);
         window.assert(&alone, 0, [0.005, 0.04], truth, &format!("{method:?}"));
     }
@@ -258,7 +261,8 @@ fn two_mirrors_show_a_geometric_row_of_lights() {
         });
         INTENSITY * seen.sum::<f64>()
     };
-    for (method, samples) in [(Method::Light, 4096), (Method::Bidirectional, 2048)] {
+    for (method, samples) in [(Method::Light, 4096), (Method::Bidirectional, 2048), (Method::Caustics, 2048)]
+    {
         let mut settings = by(method, "LS_M*DE", &settings(4, 4, 16));
         settings.layers = (0..4).map(|k| layer(&format!("LS_M{{{k}}}DE"))).collect();
         let picture = rendered(&glb, &settings, samples);

@@ -62,7 +62,9 @@ fn all_bounces_together_are_the_picture() {
     let glb = lecture();
     let bounces: Vec<String> =
         (0..=12).map(|k| format!("L.{{{k}}}E")).chain(["L.{13,}E".to_owned()]).collect();
-    for (method, samples) in [(Method::Path, 64), (Method::Light, 64), (Method::Bidirectional, 16)] {
+    let caustics = (Method::Caustics, 32);
+    for (method, samples) in [(Method::Path, 64), (Method::Light, 64), (Method::Bidirectional, 16), caustics]
+    {
         assert_sum(&rendered(&glb, &small(method, FULL, &bounces), samples), &format!("{method:?}"));
     }
 }
@@ -99,7 +101,8 @@ fn a_preset_alone_is_its_layer_of_the_full_picture() {
     let glb = lecture();
     let names = ["phong", "cook", "radiosity"];
     let layers = names.map(|name| preset(name).unwrap().paths.to_owned());
-    for (method, samples) in [(Method::Path, [64, 64]), (Method::Bidirectional, [32, 32])] {
+    let both = [(Method::Path, [64, 64]), (Method::Bidirectional, [32, 32]), (Method::Caustics, [64, 64])];
+    for (method, samples) in both {
         let full = Settings { replicates: 16, ..small(method, FULL, &layers) };
         let full = rendered(&glb, &full, samples[0]);
         for (i, paths) in layers.iter().enumerate() {
@@ -179,8 +182,8 @@ fn lights_by_their_names_make_up_the_picture() {
     assert_eq!(names.groups.iter().collect::<Vec<_>>(), ["lamp", "point"]);
     assert!(names.all.is_superset(&names.groups));
     let layers: Vec<String> = names.groups.iter().map(|name| format!("L'{name}'DE")).collect();
-    let photon = (Method::Photon, 2);
-    for (method, samples) in [(Method::Path, 16), (Method::Light, 64), (Method::Bidirectional, 16), photon] {
+    let eye = [(Method::Path, 16), (Method::Caustics, 16), (Method::Photon, 2)];
+    for (method, samples) in [(Method::Light, 64), (Method::Bidirectional, 16)].into_iter().chain(eye) {
         let picture = rendered(&glb, &small(method, "LDE", &layers), samples);
         assert_sum(&picture, &format!("{method:?}"));
     }

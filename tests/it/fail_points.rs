@@ -58,6 +58,8 @@ fn assert_survived((point, time): Death, flags: &[&str], expected: &Layers) {
         file.to_str().unwrap(),
         "--size",
         "4x4",
+        "--method",
+        "path",
         "--bounces",
         "2",
         "--samples",

@@ -38,7 +38,7 @@ pub(crate) fn undisturbed(glb: &[u8], settings: &Settings, samples: u32) -> Laye
     layers
 }
 
-fn submit(
+pub(crate) fn submit(
     farm: &Farm,
     folder: &Path,
     glb: &[u8],
@@ -54,7 +54,7 @@ fn submit(
     farm.client(&[&arguments, further].concat()).trim().to_owned()
 }
 
-fn fetch(farm: &Farm, job: &str, folder: &Path) -> Layers {
+pub(crate) fn fetch(farm: &Farm, job: &str, folder: &Path) -> Layers {
     let file = folder.join("picture.exr");
     farm.client(&["fetch", job, "-o", file.to_str().unwrap()]);
     read_layers(&fs::read(file).unwrap()).unwrap()
@@ -66,7 +66,7 @@ fn batches(job: &serde_json::Value) -> u64 {
 
 /// Kills a worker in the middle of a job, lets two others finish it, and asserts that its picture is that of core alone. The
 /// job when it is done.
-fn assert_worker_may_die(
+pub(crate) fn assert_worker_may_die(
     glb: &[u8],
     settings: &Settings,
     samples: u32,

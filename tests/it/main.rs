@@ -2,6 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on panics")]
 
+mod adaptive;
 mod auto;
 mod backup;
 mod bad_input;
@@ -21,7 +22,10 @@ mod methods;
 mod motion;
 mod mutate;
 mod page;
+mod page_reader;
+mod page_readme;
 mod page_scene;
+mod page_sky;
 mod page_workers;
 mod photons;
 mod radiosity;

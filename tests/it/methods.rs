@@ -9,6 +9,7 @@ use ovtigre_tests::{
 /// Samples a pixel and replicate; 0 where a method does not make all paths.
 #[derive(Clone, Copy)]
 struct Samples {
+    /// And by `caustics`, which makes what it makes.
     path: u32,
     both: u32,
     light: u32,
@@ -18,7 +19,9 @@ struct Samples {
 fn agree(Case { what, glb, settings }: &Case, samples: Samples) {
     let by = |method: Method| Settings { method, ..settings.clone() };
     let both = rendered(glb, &by(Method::Bidirectional), samples.both);
-    for (method, samples) in [(Method::Path, samples.path), (Method::Light, samples.light)] {
+    let others =
+        [(Method::Path, samples.path), (Method::Caustics, samples.path), (Method::Light, samples.light)];
+    for (method, samples) in others {
         if samples > 0 {
             let other = rendered(glb, &by(method), samples);
             both.assert_same(&other, 0.003, &format!("{what}: bidirectional and {method:?}"));

@@ -212,6 +212,16 @@ fn jobs_are_listed_and_cancelled(browser: &Browser, farm: &Farm, job: &str) {
     seen(browser, "jobs");
     browser.press("Job");
     browser.until("document.querySelector('.jobs-table tbody tr').textContent.includes('a room')");
+    // By what changes while they are rendered, of all jobs: what is done is ahead of what has begun.
+    let first = |states: &str| {
+        format!("{states}.includes(document.querySelector('.jobs-table tbody .badge').textContent)")
+    };
+    browser.press("Progress");
+    browser.until(&first("['running', 'queued']"));
+    browser.press("Progress");
+    browser.until(&first("['done']"));
+    browser.press("Time");
+    browser.until(&first("['running']"));
     browser.write("input[type=search]", "ALP");
     browser.until("document.querySelectorAll('.jobs-table tbody tr').length === 1");
     browser.rewrite("input[type=search]", "");
@@ -338,7 +348,7 @@ fn multiply(data: &Path, [from, to]: [u32; 2]) {
         let mut db = options.connect().await.unwrap();
         let columns = "scene, state, reason, version, priority, created_ms, started_ms, ended_ms, paused_ms, spec, progress, certified, manifest, settled";
         let numbers = format!("WITH RECURSIVE n (i) AS (SELECT {from} UNION ALL SELECT i + 1 FROM n WHERE i < {to})");
-        let jobs = format!("{numbers} INSERT INTO job (id, name, {columns}) SELECT 'copy' || i, 'copy ' || i, {columns} FROM job, n WHERE id NOT LIKE 'copy%'");
+        let jobs = format!("{numbers} INSERT INTO job (id, name, error_ppb, {columns}) SELECT 'copy' || i, 'copy ' || i, i, {columns} FROM job, n WHERE id NOT LIKE 'copy%'");
         let rows = "look, samples, wall_seconds, worker_seconds, rays, rms_error, relative_error, relative_error_upper";
         let curves = format!("{numbers} INSERT INTO checkpoint (job, {rows}) SELECT 'copy' || i, {rows} FROM checkpoint, n WHERE job NOT LIKE 'copy%'");
         for sql in [jobs, curves] {
@@ -396,6 +406,13 @@ fn a_list_of_ten_thousand_jobs_is_there_at_once() {
     browser.until("document.querySelector('.jobs-table tbody .named a').textContent === 'copy 1'");
     browser.press("Job");
     browser.until("!document.querySelector('.jobs-table tbody .named a').textContent.includes('copy')");
+    browser.press("Error");
+    browser.until("document.querySelector('.jobs-table tbody .named a').textContent === 'copy 1'");
+    browser.press("Older");
+    browser.until("document.querySelector('.jobs-table tbody .named a').textContent === 'copy 51'");
+    browser.press("Error");
+    browser.until("!document.querySelector('.jobs-table tbody .named a').textContent.includes('copy')");
+    assert_eq!(browser.value("document.querySelector('th.c-error').ariaSort"), json!("descending"));
     browser.write("input[type=search]", "copy 777");
     browser.until("document.querySelectorAll('.jobs-table tbody tr').length === 11");
 }

@@ -59,10 +59,11 @@ fn a_dropped_folder_is_seen_through_a_lens_and_held_against_a_file() {
     assert_eq!(wished["lens_radius"], 0.15);
     assert_eq!(wished["focus_distance"], 2.6);
     assert_eq!(wished["shutter"], json!([0.0, 1.0]));
+    assert_eq!(wished["sampling"], "adaptive");
     assert_eq!((&wished["camera"], &wished["method"]), (&json!("1"), &json!("path")));
     browser.until("document.querySelector('.badge').textContent === 'done'");
-    browser.until("document.querySelector('.stage').ariaLabel.includes('after 64 samples')");
-    for fact in ["radius 0.15 m, in focus at 2.6 m", "0 to 1 s"] {
+    browser.until("document.querySelector('.stage').ariaLabel.includes('after 128 samples')");
+    for fact in ["radius 0.15 m, in focus at 2.6 m", "0 to 1 s", "where the error is"] {
         assert!(text_of(&browser, ".facts").contains(fact), "{fact}: {}", text_of(&browser, ".facts"));
     }
     browser.click(".without summary");
@@ -104,8 +105,12 @@ fn a_lens_and_a_shutter_are_typed(browser: &Browser) -> String {
     };
     browser.rewrite("#f-size", "240");
     browser.rewrite("#f-camera", "1");
+    browser.write("#f-samples", "128");
+    browser.rewrite("#f-method", "light");
+    browser.rewrite("#f-sampling", "adaptive");
+    fault("sampling", "pixels cannot have different numbers of them");
     browser.rewrite("#f-method", "path");
-    browser.write("#f-samples", "64");
+    browser.until("document.querySelector('#f-sampling-fault').textContent === ''");
     browser.press("Lens and shutter");
     browser.write("#f-lens_radius", "1e");
     fault("lens_radius", "this is no number");
@@ -125,9 +130,9 @@ fn a_lens_and_a_shutter_are_typed(browser: &Browser) -> String {
     // A fault in what is folded shows.
     browser.press("Lens and shutter");
     browser.until("!document.querySelector('#f-shutter').checkVisibility()");
-    browser.rewrite("#f-samples", "65");
+    browser.rewrite("#f-samples", "129");
     browser.until("document.querySelector('#f-shutter-fault').checkVisibility()");
-    browser.rewrite("#f-samples", "64");
+    browser.rewrite("#f-samples", "128");
     browser.rewrite("#f-shutter", "");
     browser.rewrite("#f-closes", "");
     browser.write("#f-closes", "1");
@@ -180,7 +185,7 @@ fn a_job_is_left(browser: &Browser, farm: &Farm, job: &str) {
         [...document.querySelectorAll('button')].find((b) => b.textContent === 'Report').click(); });";
     let report = browser.run(report, &[]);
     assert_eq!(report["job"]["id"], job);
-    assert_eq!(report["rows"].as_array().unwrap().last().unwrap()["samples"], 64);
+    assert_eq!(report["rows"].as_array().unwrap().last().unwrap()["samples"], 128);
     browser.press("More samples");
     browser.rewrite("#asked", "1000000");
     browser.press("Draw more");

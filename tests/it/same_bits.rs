@@ -97,7 +97,7 @@ fn methods() -> Vec<(String, Settings)> {
         let all = paths.into_iter().chain(further).enumerate();
         all.map(|(i, shows)| Layer { name: format!("l{i}"), shows }).collect()
     };
-    let each = [Method::Path, Method::Light, Method::Bidirectional, Method::Photon];
+    let each = [Method::Path, Method::Light, Method::Bidirectional, Method::Caustics, Method::Photon];
     let both = each.into_iter().flat_map(|method| {
         let alone = Settings { method, ..plain.clone() };
         let filtered = Settings { layers: layers(method), ..alone.clone() };
@@ -257,7 +257,8 @@ fn the_scene_that_comes_along_is_the_one_its_code_makes() {
 #[test]
 fn what_is_compiled_for_less_gives_the_bits_of_the_general_kernel() {
     let glb = everything(1.0, 0.0);
-    for method in [Method::Path, Method::Light, Method::Bidirectional, Method::Photon] {
+    let all = [Method::Path, Method::Light, Method::Bidirectional, Method::Caustics, Method::Photon];
+    for method in all {
         let settings = in_environment(Settings { method, ..settings(40, 30, 1) }, 0.2);
         let scene = scene(&glb, &settings);
         let block = Block { index: 2, start: 2, count: 2 };

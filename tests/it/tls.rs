@@ -69,9 +69,8 @@ fn a_farm_that_encrypts_is_worked_for_and_called_only_by_who_trusts_it() {
     let _worker = worker_with(&farm.url, &[("SSL_CERT_FILE".to_owned(), authority.clone())]);
     let (scene, picture) = (file("scene.glb"), file("picture.exr"));
     fs::write(&scene, room()).unwrap();
-    let render =
-        ["render", &scene, "-o", &picture, "--size", "8x8", "--samples", "1024", "--server", &farm.url];
-    let rendered = ask(&render, Some(&authority));
+    let render = ["render", &scene, "-o", &picture, "--size", "8x8", "--samples", "1024", "--method", "path"];
+    let rendered = ask(&[&render[..], &["--server", &farm.url]].concat(), Some(&authority));
     assert!(rendered.status.success(), "{}", String::from_utf8_lossy(&rendered.stderr));
     let picture = read_layers(&fs::read(picture).unwrap()).unwrap();
     assert!(picture.channels == undisturbed(&room(), &settings(8, 8, 4), 1024).channels);

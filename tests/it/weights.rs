@@ -4,8 +4,8 @@ use glam::Vec3;
 use ovtigre_core::settings::{Lens, Method, Settings, Strategy, Weights};
 use ovtigre_tests::{
     glb::Glb,
-    picture::{in_environment, rendered, settings},
-    scenes::{cuboid, glass, lambert, mirror},
+    picture::{Rendered, in_environment, rendered, settings},
+    scenes::{cuboid, flipped, floor, glass, lambert, mirror},
     stage::{metal, plastic, room, room_in_parallel, smooth_sphere},
 };
 use serde_json::{Value, json};
@@ -23,15 +23,19 @@ fn assert_same_weights(glb: &[u8], settings: &Settings, what: &str) {
     for weights in [Weights::Balance, Weights::Power] {
         recursive.weights = weights;
         let written_out = Settings { strategies: techniques(), ..recursive.clone() };
-        let [a, b] = [&recursive, &written_out].map(|s| rendered(glb, s, 16));
-        let mean = a.mean().0;
-        assert!(mean > 0.01, "{what}: there is nothing to compare");
-        let [a, b] = [a, b].map(|r| r.picture().planes.remove(0));
-        for (i, (a, b)) in a.iter().flatten().zip(b.iter().flatten()).enumerate() {
-            let (a, b) = (f64::from(*a), f64::from(*b));
-            let off = (a - b).abs();
-            assert!(off <= 1e-4 * a + 1e-6 * mean, "{what}, {weights:?}, value {i}: {a} and {b}");
-        }
+        let both = [&recursive, &written_out].map(|s| rendered(glb, s, 16));
+        assert_same_values(both, &format!("{what}, {weights:?}"));
+    }
+}
+
+fn assert_same_values([a, b]: [Rendered; 2], what: &str) {
+    let mean = a.mean().0;
+    assert!(mean > 0.01, "{what}: there is nothing to compare");
+    let [a, b] = [a, b].map(|r| r.picture().planes.remove(0));
+    for (i, (a, b)) in a.iter().flatten().zip(b.iter().flatten()).enumerate() {
+        let (a, b) = (f64::from(*a), f64::from(*b));
+        let off = (a - b).abs();
+        assert!(off <= 1e-4 * a + 1e-6 * mean, "{what}, value {i}: {a} and {b}");
     }
 }
 
@@ -118,6 +122,38 @@ fn through_a_lens() {
 #[test]
 fn of_parallel_rays() {
     assert_same_weights(&room_in_parallel(5.0, everything), &in_environment(small(), 0.5), "parallel rays");
+}
+
+/// Where every surface is more than diffuse, `caustics` is what is left of `bidirectional` without joints between surfaces: the samples
+/// are the same, so only rounding differs.
+#[test]
+fn of_caustics_are_those_of_its_techniques() {
+    let all = glossy_room();
+    let mut caustics = Settings { method: Method::Caustics, ..in_environment(small(), 0.5) };
+    caustics.bounces = Some(5);
+    let mut written_out = Settings { method: Method::Bidirectional, ..caustics.clone() };
+    written_out.strategies =
+        techniques().into_iter().filter(|one| one.s <= 1 && one.t >= 2 || one.s >= 2 && one.t == 1).collect();
+    assert_same_values([&caustics, &written_out].map(|s| rendered(&all, s, 16)), "caustics");
+    // And the lens is joined to: without that there is less.
+    let from_eye = |one: &Strategy| one.t >= 2;
+    written_out.strategies.retain(from_eye);
+    written_out.weights = Weights::Balance;
+    let less = rendered(&all, &written_out, 16).picture().planes.remove(0);
+    assert!(less != rendered(&all, &caustics, 16).picture().planes[0]);
+}
+
+/// A closed room of plastic with bodies of every kind, lamps of plastic, a point and a sun.
+fn glossy_room() -> Vec<u8> {
+    let mut glb = Glb::new();
+    glb.body(plastic(0.5), flipped(cuboid(Vec3::splat(-1.0), Vec3::splat(1.0))));
+    bodies(&mut glb);
+    let mut lamp = plastic(0.4);
+    lamp["emissiveFactor"] = json!([1.0, 1.0, 1.0]);
+    glb.body(lamp, flipped(floor(0.9, 0.6, 0.1, 0.0)));
+    glb.light(json!({"type": "point", "intensity": 1.0}), downwards());
+    glb.perspective(Vec3::new(0.0, 0.0, 0.95), Vec3::ZERO, 70.0);
+    glb.finish()
 }
 
 #[test]

@@ -8,6 +8,8 @@ use crate::{
 };
 use ovtigre_core::{
     film::{
+        allocate::allocate,
+        allocation::Allocations,
         append::Prefix,
         batch::{Batch, Block},
         certificate::{self, level},
@@ -17,12 +19,12 @@ use ovtigre_core::{
     },
     gltf::limits::Limits,
     render::{
-        batch::render,
+        batch::render_allocated,
         inspect::{by_chance, inspect},
         prepare::{Prepared, prepare},
         progress::Progress,
     },
-    settings::{Method, Settings},
+    settings::{Distribution, Method, Settings},
 };
 use rayon::prelude::*;
 use std::fmt::Write as _;
@@ -31,6 +33,8 @@ use std::fmt::Write as _;
 const REFERENCE_REPLICATES: u32 = 16;
 /// Seed of references; runs have others.
 const REFERENCE_SEED: u64 = u64::MAX;
+/// Samples of each replicate after which adaptive ones are allocated, as by a farm.
+const DECIDED_AFTER: u32 = 16;
 /// Errors to stop at.
 const TARGETS: [f64; 6] = [0.5, 0.3, 0.2, 0.1, 0.05, 0.03];
 
@@ -42,11 +46,14 @@ pub struct Case {
     glb: Vec<u8>,
     method: Method,
     reference: Method,
+    sampling: Distribution,
 }
 
 /// The scenes: two of diffuse light, one with correlated pixels, one of all kinds of materials, and two with heavy tails.
 pub fn cases() -> Vec<Case> {
-    let case = |name, glb, method, reference| Case { name, glb, method, reference };
+    let case =
+        |name, glb, method, reference| Case { name, glb, method, reference, sampling: Distribution::Uniform };
+    let adaptive = |case| Case { sampling: Distribution::Adaptive, ..case };
     vec![
         case("cornell", cornell(), Method::Path, Method::Bidirectional),
         case("two-rooms", two_rooms(), Method::Path, Method::Bidirectional),
@@ -54,6 +61,8 @@ pub fn cases() -> Vec<Case> {
         case("room-bidirectional", room(), Method::Bidirectional, Method::Path),
         case("caustic-path", caustic(), Method::Path, Method::Bidirectional),
         case("lamp-behind-glass-path", lamp_behind_glass(), Method::Path, Method::Bidirectional),
+        adaptive(case("cornell-adaptive", cornell(), Method::Path, Method::Bidirectional)),
+        adaptive(case("caustic-adaptive", caustic(), Method::Path, Method::Bidirectional)),
     ]
 }
 
@@ -101,14 +110,14 @@ pub struct Calibration {
 pub fn calibrate(case: &Case, plan: Plan) -> Calibration {
     let of =
         |method, seed, replicates| Settings { method, seed, ..settings(plan.side, plan.side, replicates) };
-    let first = of(case.method, plan.seed, plan.replicates);
+    let first = Settings { sampling: case.sampling, ..of(case.method, plan.seed, plan.replicates) };
     let prepared = scene(&case.glb, &first);
     let longest = plan.replicates << (plan.looks - 1);
     let samples = (longest * plan.reference).div_ceil(REFERENCE_REPLICATES).next_power_of_two();
     let settings = of(case.reference, REFERENCE_SEED, REFERENCE_REPLICATES);
     let other = prepare(case.glb.as_slice(), None, &settings).expect("a scene that can be rendered");
     let mut lanes = lanes(&settings);
-    append(&other, &settings, &mut lanes, Block { index: 0, start: 0, count: samples });
+    append(&other, &settings, &mut lanes, Block { index: 0, start: 0, count: samples }, None);
     let reference = Reference::of_picture(&picture(settings.size, settings.size.frame(), &lanes));
     let contents = inspect(case.glb.as_slice(), &Limits::default()).expect("a scene that can be read");
     let by_chance = by_chance(case.method, contents.letters, contents.brightest);
@@ -124,11 +133,23 @@ fn lanes(settings: &Settings) -> Vec<Vec<Prefix>> {
     vec![(0..settings.replicates).map(|r| Prefix::empty(settings.size.frame(), r, 1)).collect()]
 }
 
-fn append(prepared: &Prepared, settings: &Settings, lanes: &mut [Vec<Prefix>], block: Block) {
+fn append(
+    prepared: &Prepared,
+    settings: &Settings,
+    lanes: &mut [Vec<Prefix>],
+    block: Block,
+    allocations: Option<&Allocations>,
+) {
     for prefix in &mut lanes[0] {
         let batch = Batch { region: settings.size.frame(), replicate: prefix.replicate(), block };
-        let sum = render(prepared, settings, batch, &Progress::new()).expect("not stopped");
-        prefix.append(&sum).expect("in order");
+        let allocation = allocations.map(|both| both.of(prefix.replicate()));
+        let sum = render_allocated(prepared, settings, batch, allocation, &Progress::new());
+        let sum = sum.expect("not stopped");
+        let appended = match allocation {
+            Some(allocation) => prefix.append_allocated(&sum, allocation),
+            None => prefix.append(&sum),
+        };
+        appended.expect("in order");
     }
 }
 
@@ -141,10 +162,17 @@ fn looks(
 ) -> Vec<Look> {
     let mut lanes = lanes(settings);
     let region = settings.size.frame();
+    let adaptive = settings.sampling == Distribution::Adaptive;
+    let mut allocations = None;
     (0..looks)
         .map(|index| {
             let start = if index == 0 { 0 } else { 1 << (index - 1) };
-            append(prepared, settings, &mut lanes, Block { index, start, count: start.max(1) });
+            if adaptive && start == DECIDED_AFTER {
+                allocations = allocate(settings.size, region, &lanes);
+                assert!(allocations.is_some(), "there are replicates with samples");
+            }
+            let block = Block { index, start, count: start.max(1) };
+            append(prepared, settings, &mut lanes, block, allocations.as_ref());
             let found = estimate(region, &lanes, certificate::Look { number: index + 1, by_chance })
                 .expect("there are replicates");
             Look {

@@ -204,12 +204,13 @@ fn partial() -> Vec<u8> {
     let batch = Schedule::new(size.frame(), 2, 4, 300).batch(0, 1, 1).expect("in the schedule");
     let plane = |v: f32| (0..64).map(|i| [i as f32 * v, 1.0, v]).collect();
     let invalid = InvalidSamples::default();
-    let sum = Sum { batch, planes: vec![plane(1.0), plane(0.3)], invalid, rays: 12 };
+    let sum = Sum { batch, planes: vec![plane(1.0), plane(0.3)], invalid, rays: 12, tile_rays: Vec::new() };
     let attributes = PartialAttributes {
         job: "j1".to_owned(),
         scene: "0".repeat(64),
         method: "path".to_owned(),
         solution: Some("{}".to_owned()),
+        allocation: None,
     };
     write_partial(&sum, size, &attributes)
 }

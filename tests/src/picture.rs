@@ -2,6 +2,7 @@
 
 use ovtigre_core::{
     film::{
+        allocate::{allocate, decided_after},
         append::Prefix,
         certificate::Look,
         error::{ErrorEstimate, estimate},
@@ -10,13 +11,13 @@ use ovtigre_core::{
         size::{Region, Size},
     },
     render::{
-        batch::render,
+        batch::render_allocated,
         prepare::{Prepared, prepare},
         progress::Progress,
     },
     settings::{
-        CameraChoice, Environment, EnvironmentSource, FULL, Gloss, Method, Settings, Shadows, Shutter,
-        Weights,
+        CameraChoice, Distribution, Environment, EnvironmentSource, FULL, Gloss, Method, Settings, Shadows,
+        Shutter, Weights,
     },
 };
 
@@ -58,6 +59,7 @@ pub fn settings(width: u32, height: u32, replicates: u32) -> Settings {
         shadows: Shadows::On,
         seed: 0,
         replicates,
+        sampling: Distribution::Uniform,
     }
 }
 
@@ -85,25 +87,38 @@ pub fn rendered(glb: &[u8], settings: &Settings, samples: u32) -> Rendered {
     rendered_of(&scene(glb, settings), settings, samples)
 }
 
-/// The same of a scene that is prepared already.
+/// The same of a scene that is prepared already. Where the settings' sampling is adaptive, it is as a farm's.
 pub fn rendered_of(scene: &Prepared, settings: &Settings, samples: u32) -> Rendered {
     let planes = settings.layers.len() + 1;
-    let schedule = Schedule::new(settings.size.frame(), planes as u32, settings.replicates, samples);
-    let prefixes = (0..schedule.regions().len())
-        .map(|region| {
-            (0..settings.replicates)
-                .map(|replicate| {
-                    let mut prefix = Prefix::empty(schedule.regions()[region], replicate, planes);
-                    for block in 0..schedule.blocks().len() {
-                        let batch = schedule.batch(region, replicate, block).expect("in the schedule");
-                        let sum = render(scene, settings, batch, &Progress::new()).expect("not stopped");
-                        prefix.append(&sum).expect("in order");
-                    }
-                    prefix
-                })
-                .collect()
-        })
-        .collect();
+    let frame = settings.size.frame();
+    let schedule = Schedule::new(frame, planes as u32, settings.replicates, samples);
+    let empty = |region: &Region| {
+        (0..settings.replicates).map(|replicate| Prefix::empty(*region, replicate, planes)).collect()
+    };
+    let mut prefixes: Vec<Vec<Prefix>> = schedule.regions().iter().map(empty).collect();
+    let adaptive = settings.sampling == Distribution::Adaptive;
+    let decided =
+        adaptive.then(|| decided_after(&schedule, samples).expect("enough samples")).map(|n| n as usize);
+    let mut allocations = None;
+    for block in 0..schedule.blocks().len() {
+        if decided == Some(block) {
+            allocations = allocate(settings.size, frame, &prefixes);
+            assert!(allocations.is_some(), "there are replicates with samples");
+        }
+        for (region, prefixes) in prefixes.iter_mut().enumerate() {
+            for prefix in prefixes {
+                let batch = schedule.batch(region, prefix.replicate(), block).expect("in the schedule");
+                let allocation = allocations.as_ref().map(|both| both.of(prefix.replicate()));
+                let sum = render_allocated(scene, settings, batch, allocation, &Progress::new());
+                let sum = sum.expect("not stopped");
+                let appended = match allocation {
+                    Some(allocation) => prefix.append_allocated(&sum, allocation),
+                    None => prefix.append(&sum),
+                };
+                appended.expect("in order");
+            }
+        }
+    }
     Rendered { settings: settings.clone(), prefixes }
 }
 

@@ -10,7 +10,7 @@ use crate::{
     scenes::{SceneError, SceneFolder},
 };
 use ovtigre_core::{
-    film::exr::PartialAttributes,
+    film::{allocation::Allocation, exr::PartialAttributes},
     settings::{EnvironmentSource, Settings},
 };
 use ovtigre_proto::{
@@ -155,18 +155,19 @@ impl<R: Renderer> Labour<R> {
 
     /// On a thread that may be blocked. `Ok(None)` where the batch was stopped.
     fn batch(&self, work: &Work, files: Option<Files>) -> Result<Option<Rendered>, Failed> {
-        let Lease { job, scene: scene_id, settings, batch, .. } = &work.lease;
+        let Lease { job, scene: scene_id, settings, .. } = &work.lease;
         let scene = self.scene(&work.lease, files)?;
         let _rendering = work.errand.part(&self.traces, "render");
         note!(debug, work.errand, "renders");
         let start = Instant::now();
-        let sum = self.pool.install(|| self.renderer.render(&scene, settings, *batch, &work.progress));
+        let sum = self.pool.install(|| self.renderer.render(&scene, &work.lease, &work.progress));
         let Some(sum) = sum else { return Ok(None) };
         let attributes = PartialAttributes {
             job: job.to_string(),
             scene: scene_id.to_string(),
             method: settings.method.name().to_owned(),
             solution: self.renderer.solution(&scene),
+            allocation: work.lease.allocation.as_ref().map(Allocation::hash),
         };
         let seconds = start.elapsed().as_secs_f64();
         let (errand, size, upload) = (work.errand.clone(), settings.size, work.lease.upload.clone());

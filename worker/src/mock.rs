@@ -17,7 +17,7 @@ use ovtigre_core::{
         sum::Sum,
     },
     render::progress::Progress,
-    settings::{CameraChoice, FULL, Gloss, Method, Settings, Shadows, Shutter, Weights},
+    settings::{CameraChoice, Distribution, FULL, Gloss, Method, Settings, Shadows, Shutter, Weights},
 };
 use ovtigre_proto::{
     client::farm::Client,
@@ -53,6 +53,7 @@ pub(crate) fn settings() -> Settings {
         shadows: Shadows::On,
         seed: 0,
         replicates: 1,
+        sampling: Distribution::Uniform,
     }
 }
 
@@ -70,6 +71,7 @@ pub(crate) fn lease(n: u32, seconds: f64) -> Lease {
         },
         seconds,
         upload: None,
+        allocation: None,
     }
 }
 
@@ -267,7 +269,8 @@ impl Renderer for MockRenderer {
         if matches!(self.0, Conduct::Unreadable) { Err("mesh 7 has no end".to_owned()) } else { Ok(()) }
     }
 
-    fn render(&self, (): &(), _: &Settings, batch: Batch, progress: &Progress) -> Option<Sum> {
+    fn render(&self, (): &(), lease: &Lease, progress: &Progress) -> Option<Sum> {
+        let batch = lease.batch;
         match self.0 {
             Conduct::Panic => panic!("a panic that a test asked for"),
             Conduct::Endless => {
@@ -280,6 +283,6 @@ impl Renderer for MockRenderer {
             Conduct::Render | Conduct::Unreadable => {}
         }
         let planes = vec![vec![[batch.block.index as f32; 3]; batch.region.pixels()]];
-        Some(Sum { batch, planes, invalid: InvalidSamples::default(), rays: 1 })
+        Some(Sum { batch, planes, invalid: InvalidSamples::default(), rays: 1, tile_rays: Vec::new() })
     }
 }

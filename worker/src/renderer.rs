@@ -1,15 +1,16 @@
 //! What a worker needs of a renderer: a border at which tests put a simpler one.
 
 use ovtigre_core::{
-    film::{batch::Batch, sum::Sum},
+    film::sum::Sum,
     render::{
-        batch::render,
+        batch::render_allocated,
         prepare::{Prepared, prepare},
         profile::NUMERIC_PROFILE,
         progress::Progress,
     },
     settings::Settings,
 };
+use ovtigre_proto::lease::Lease;
 use std::sync::Arc;
 
 /// Turns scenes and batches into sums. Called on the threads of the worker's pool.
@@ -33,14 +34,8 @@ pub trait Renderer: Send + Sync + 'static {
         None
     }
 
-    /// The sum of a batch; `None` where it was stopped.
-    fn render(
-        &self,
-        scene: &Self::Scene,
-        settings: &Settings,
-        batch: Batch,
-        progress: &Progress,
-    ) -> Option<Sum>;
+    /// The sum of a lease's batch; `None` where it was stopped.
+    fn render(&self, scene: &Self::Scene, lease: &Lease, progress: &Progress) -> Option<Sum>;
 }
 
 /// The renderer of this build.
@@ -67,13 +62,8 @@ impl Renderer for Core {
         scene.solution()
     }
 
-    fn render(
-        &self,
-        scene: &Prepared,
-        settings: &Settings,
-        batch: Batch,
-        progress: &Progress,
-    ) -> Option<Sum> {
-        render(scene, settings, batch, progress).ok()
+    fn render(&self, scene: &Prepared, lease: &Lease, progress: &Progress) -> Option<Sum> {
+        let allocation = lease.allocation.as_ref();
+        render_allocated(scene, &lease.settings, lease.batch, allocation, progress).ok()
     }
 }

@@ -1,6 +1,9 @@
 //! From linear light to a PNG for the screen.
 
-use super::{size::Region, sum::Plane};
+use super::{
+    size::{Region, Size},
+    sum::Plane,
+};
 use crate::math::colour::linear_to_srgb;
 use image::{ImageEncoder as _, codecs::png};
 
@@ -13,11 +16,24 @@ pub struct Develop {
     pub width: Option<u32>,
 }
 
+impl Develop {
+    /// The size of the PNG of a picture: whole boxes of pixels become one.
+    pub fn size(&self, of: Size) -> Size {
+        let side = self.box_side(of.width);
+        Size { width: of.width.div_ceil(side), height: of.height.div_ceil(side) }
+    }
+
+    /// Pixels along a box of those that become one.
+    fn box_side(&self, width: u32) -> u32 {
+        self.width.map_or(1, |most| width.div_ceil(most.max(1)))
+    }
+}
+
 /// Develops a plane of `region`: exposure, clip, sRGB, 8 bits a channel. No tone curve: what is
 /// above white is white.
 pub fn png(region: Region, plane: &Plane, develop: &Develop) -> Vec<u8> {
     assert_eq!(plane.len(), region.pixels(), "a plane of another size than its region");
-    let (width, height, plane) = shrink(region, plane, develop.width);
+    let (Size { width, height }, plane) = shrink(region, plane, develop);
     let scale = libm::exp2f(develop.exposure);
     let encode = |v: f32| (linear_to_srgb((v * scale).clamp(0.0, 1.0)) * 255.0).round() as u8;
     let bytes: Vec<u8> = plane.iter().flatten().map(|v| encode(*v)).collect();
@@ -28,12 +44,13 @@ pub fn png(region: Region, plane: &Plane, develop: &Develop) -> Vec<u8> {
     png
 }
 
-/// Averages whole boxes of pixels until the picture is at most `width` wide.
-fn shrink(region: Region, plane: &Plane, width: Option<u32>) -> (u32, u32, Plane) {
-    let box_side = width.map_or(1, |w| region.width.div_ceil(w.max(1)));
-    let (w, h) = (region.width.div_ceil(box_side), region.height.div_ceil(box_side));
+/// Averages whole boxes of pixels until the picture is at most as wide as asked for.
+fn shrink(region: Region, plane: &Plane, develop: &Develop) -> (Size, Plane) {
+    let box_side = develop.box_side(region.width);
+    let to = develop.size(Size { width: region.width, height: region.height });
+    let (w, h) = (to.width, to.height);
     if box_side == 1 {
-        return (w, h, plane.clone());
+        return (to, plane.clone());
     }
     let mean = |x: u32, y: u32| {
         let mut sum = [0.0_f64; 3];
@@ -47,7 +64,7 @@ fn shrink(region: Region, plane: &Plane, width: Option<u32>) -> (u32, u32, Plane
         }
         sum.map(|s| (s / n) as f32)
     };
-    (w, h, (0..h).flat_map(|y| (0..w).map(move |x| (x, y))).map(|(x, y)| mean(x, y)).collect())
+    (to, (0..h).flat_map(|y| (0..w).map(move |x| (x, y))).map(|(x, y)| mean(x, y)).collect())
 }
 
 #[cfg(test)]

@@ -162,7 +162,15 @@ mod tests {
             // Mean 1/2, variance 1/12.
             let plane = (0..size.frame().pixels()).map(|_| [noise(state), noise(state), noise(state)]);
             let (batch, planes) = (schedule.batch(0, r, 0).unwrap(), vec![plane.collect()]);
-            prefix.append(&Sum { batch, planes, invalid: InvalidSamples::default(), rays: 0 }).unwrap();
+            prefix
+                .append(&Sum {
+                    batch,
+                    planes,
+                    invalid: InvalidSamples::default(),
+                    rays: 0,
+                    tile_rays: Vec::new(),
+                })
+                .unwrap();
             prefix
         });
         vec![one.collect()]
@@ -188,7 +196,15 @@ mod tests {
             let grey: Vec<f32> = (0..size.frame().pixels()).map(|_| noise(&mut state)).collect();
             let plane = |scale: f32| grey.iter().map(|v| [scale * v; 3]).collect();
             let (batch, planes) = (schedule.batch(0, r, 0).unwrap(), vec![plane(1.0), plane(0.125)]);
-            prefix.append(&Sum { batch, planes, invalid: InvalidSamples::default(), rays: 0 }).unwrap();
+            prefix
+                .append(&Sum {
+                    batch,
+                    planes,
+                    invalid: InvalidSamples::default(),
+                    rays: 0,
+                    tile_rays: Vec::new(),
+                })
+                .unwrap();
             prefix
         });
         let prefixes = vec![one.collect()];

@@ -88,7 +88,15 @@ mod tests {
             let batch: Batch = schedule.batch(0, r, 0).unwrap();
             let value = values[r as usize];
             let planes = vec![vec![[value, 0.0, 1.0]; 4], vec![[0.0, 2.0 * value, 3.0]; 4]];
-            prefix.append(&Sum { batch, planes, invalid: InvalidSamples::default(), rays: 0 }).unwrap();
+            prefix
+                .append(&Sum {
+                    batch,
+                    planes,
+                    invalid: InvalidSamples::default(),
+                    rays: 0,
+                    tile_rays: Vec::new(),
+                })
+                .unwrap();
             prefix
         });
         let picture = picture(size, size.frame(), &[prefixes.collect()]);

@@ -3,6 +3,7 @@
 use super::{
     batch::{Batch, Block},
     estimate::Picture,
+    grid::TILES_MAX,
     invalid::InvalidSamples,
     size::{Region, Size},
     sum::{Plane, Sum},
@@ -54,6 +55,8 @@ pub struct PartialAttributes {
     pub method: String,
     /// How the method solved the scene before the first sample, as JSON, where it did.
     pub solution: Option<String>,
+    /// Hash of the allocation that says how many samples each pixel has, where there is one.
+    pub allocation: Option<String>,
 }
 
 /// What a picture's attributes say.
@@ -133,7 +136,9 @@ pub fn write_partial(sum: &Sum, frame: Size, attributes: &PartialAttributes) -> 
     let planes: Vec<(String, &Plane)> =
         sum.planes.iter().enumerate().map(|(i, plane)| (plane_prefix(i), plane)).collect();
     let solution = attributes.solution.iter().map(|json| ("ovtigre.solution", json.clone()));
-    let texts = named.into_iter().chain(solution);
+    let allocation = attributes.allocation.iter().map(|hash| ("ovtigre.allocation", hash.clone()));
+    let counted = (!sum.tile_rays.is_empty()).then(|| ("ovtigre.tile_rays", numbers_text(&sum.tile_rays)));
+    let texts = named.into_iter().chain(solution).chain(allocation).chain(counted);
     let texts = texts.map(|(name, value)| (name, AttributeValue::Text(text(&value)))).collect();
     encode(&planes, frame, region, texts, Encoding::UNCOMPRESSED, LayerAttributes::default())
 }
@@ -168,12 +173,17 @@ pub fn read_partial(bytes: &[u8], pixels_max: usize) -> Result<(Sum, PartialAttr
         planes,
         invalid: invalid_from(find("ovtigre.invalid")?).ok_or(ExrError::Attribute("ovtigre.invalid"))?,
         rays: number(find("ovtigre.rays")?, "ovtigre.rays")?,
+        tile_rays: match layers.attributes.get("ovtigre.tile_rays") {
+            Some(text) => numbers_from(text).ok_or(ExrError::Attribute("ovtigre.tile_rays"))?,
+            None => Vec::new(),
+        },
     };
     let attributes = PartialAttributes {
         job: find("ovtigre.job")?.clone(),
         scene: find("ovtigre.scene")?.clone(),
         method: find("ovtigre.method")?.clone(),
         solution: layers.attributes.get("ovtigre.solution").cloned(),
+        allocation: layers.attributes.get("ovtigre.allocation").cloned(),
     };
     if attributes.solution.as_ref().is_some_and(|json| json.len() > SOLUTION_MAX) {
         return Err(ExrError::Attribute("ovtigre.solution"));
@@ -296,6 +306,15 @@ fn text(value: &str) -> Text {
     })
 }
 
+fn numbers_text(numbers: &[u32]) -> String {
+    numbers.iter().map(u32::to_string).collect::<Vec<_>>().join(",")
+}
+
+fn numbers_from(text: &str) -> Option<Vec<u32>> {
+    let numbers: Option<Vec<u32>> = text.split(',').map(|n| n.parse().ok()).take(TILES_MAX + 1).collect();
+    numbers.filter(|numbers| numbers.len() <= TILES_MAX)
+}
+
 fn invalid_text(invalid: InvalidSamples) -> String {
     format!("{},{},{}", invalid.nan, invalid.infinite, invalid.negative)
 }
@@ -364,7 +383,13 @@ mod tests {
         let batch = Batch { region, replicate: 3, block: Block { index: 2, start: 8, count: 8 } };
         let plane: Plane = (0..6).map(|i| [i as f32, 1e-30, f32::MAX / (1.0 + i as f32)]).collect();
         let invalid = InvalidSamples { nan: 1, infinite: 2, negative: 3 };
-        Sum { batch, planes: vec![plane.clone(), plane], invalid, rays: 12345 }
+        Sum {
+            batch,
+            planes: vec![plane.clone(), plane],
+            invalid,
+            rays: 12345,
+            tile_rays: vec![3, 0, 1 << 31],
+        }
     }
 
     fn attributes() -> PartialAttributes {
@@ -373,6 +398,7 @@ mod tests {
             scene: "s".to_owned(),
             method: "path".to_owned(),
             solution: Some("{}".to_owned()),
+            allocation: Some("abc".to_owned()),
         }
     }
 

@@ -72,7 +72,13 @@ mod tests {
                 let mut prefix = Prefix::empty(size.frame(), r, 1);
                 let plane = (0..2304).map(|i| [low + (high - low) * noise() + add(i, r); 3]).collect();
                 let batch = schedule.batch(0, r, 0).unwrap();
-                let sum = Sum { batch, planes: vec![plane], invalid: InvalidSamples::default(), rays: 0 };
+                let sum = Sum {
+                    batch,
+                    planes: vec![plane],
+                    invalid: InvalidSamples::default(),
+                    rays: 0,
+                    tile_rays: Vec::new(),
+                };
                 prefix.append(&sum).unwrap();
                 prefix
             })

@@ -1,5 +1,7 @@
 //! Which samples, their sums, partial EXR, merging, error, developing. Knows no scene.
 
+pub mod allocate;
+pub mod allocation;
 pub mod append;
 pub mod batch;
 pub mod certificate;
@@ -8,6 +10,7 @@ pub mod develop;
 pub mod error;
 pub mod estimate;
 pub mod exr;
+pub mod grid;
 pub mod invalid;
 pub mod missed;
 pub mod reference;

@@ -18,6 +18,8 @@ pub struct Sum {
     pub invalid: InvalidSamples,
     /// Rays traced, shadow rays included.
     pub rays: u64,
+    /// Rays of each tile of the frame that the region meets, in their order, where samples are to be allocated; else empty.
+    pub tile_rays: Vec<u32>,
 }
 
 impl Sum {
@@ -31,6 +33,9 @@ impl Sum {
             hasher.update(&n.to_le_bytes());
         }
         for n in [self.invalid.nan, self.invalid.infinite, self.invalid.negative, self.rays] {
+            hasher.update(&n.to_le_bytes());
+        }
+        for n in &self.tile_rays {
             hasher.update(&n.to_le_bytes());
         }
         let mut row = Vec::new();

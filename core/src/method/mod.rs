@@ -2,6 +2,7 @@
 
 pub mod bidirectional;
 pub mod camera;
+pub mod caustics;
 pub mod light;
 pub mod path;
 pub mod photon;

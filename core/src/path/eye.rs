@@ -72,6 +72,7 @@ pub fn from_eye<'a, C: Carriage>(
     // Light subpaths that are joined to the lens reach every pixel.
     let near = match rules.weighing {
         Weighing::All(h) => h.of(rules.light_paths / pdf),
+        Weighing::Caustics => rules.light_paths / pdf,
         _ => 0.0,
     };
     let carried = C::Eye::in_state(rules.language.eye_start(), Vec3::ONE);

@@ -10,10 +10,10 @@ use crate::path::expression::language::LightState;
 use crate::path::media::Media;
 use crate::path::mis::exhaustive::Link;
 use crate::path::mis::partial::Partial;
-use crate::path::rules::Rules;
+use crate::path::rules::{Rules, Weighing};
 use crate::path::tally::Tally;
 use crate::path::throughput::{Carriage, Throughput};
-use crate::path::vertex::{Density, Vertex};
+use crate::path::vertex::{Cast, Density, Vertex};
 use crate::path::walk::{Edge, EdgeKind, Visitor, Walk};
 use crate::sampler::{Dimension, Sampler, StartUse};
 use crate::scene::Scene;
@@ -62,8 +62,14 @@ impl<'a, C: Carriage> Visitor<'a, LightState, C::Light> for FromLight<'a, C> {
         }
     }
 
+    fn leaves(&self, walk: &Walk<'a, LightState, C::Light>, vertex: &Vertex<'a>) -> bool {
+        !matches!(walk.rules.weighing, Weighing::Caustics)
+            || walk.scatterings > 0
+            || vertex.cast() == Cast::Caustic
+    }
+
     fn scatters(&mut self, walk: &Walk<'a, LightState, C::Light>, vertex: &Vertex<'a>, tally: &mut Tally) {
-        if !vertex.is_smooth() {
+        if !vertex.is_smooth() || !self.leaves(walk, vertex) {
             return;
         }
         to_lens::<C::Eye, C::Light>(walk, vertex, self.start, tally);

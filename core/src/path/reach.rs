@@ -133,6 +133,8 @@ impl Course {
             Method::Path => is_hit || next_event,
             Method::Light => to_lens,
             Method::Bidirectional => is_hit || next_event || to_lens || self.pair,
+            // What no next event makes comes from a surface that is more than diffuse.
+            Method::Caustics => is_hit || next_event || to_lens,
             // Direct light is looked for at the first rough surface; all other light comes there as photons.
             Method::Photon => is_hit || self.some,
             Method::Radiosity => !self.not_diffuse && (is_hit || self.any),
@@ -224,7 +226,7 @@ impl<'l> Search<'l> {
             let missing = |node: &&Node| self.is_missing(**node, method);
             self.graph.keys().filter(missing).all(|node| node.1.is_made(*other, self.light, self.eye))
         };
-        let others = [Method::Path, Method::Light, Method::Bidirectional, Method::Photon];
+        let others = [Method::Path, Method::Light, Method::Bidirectional, Method::Caustics, Method::Photon];
         let reached_by = others.into_iter().filter(makes_all).collect();
         let paths = paths.iter().map(|word| text(word)).collect();
         let shares = self.shares(method, bounces);
@@ -314,6 +316,9 @@ fn why(method: Method, light: LightKind, direct: bool) -> &'static str {
         (Method::Light, _) => {
             "no light is joined to the lens from an ideally specular surface, or from a point"
         }
+        (Method::Caustics, _) => {
+            "ideally specular surfaces next to both eye and light leave nothing to join to the lens or to a light without extent"
+        }
         (Method::Bidirectional, _) => {
             "ideally specular surfaces everywhere between eye and light leave no two vertices that can be joined"
         }
@@ -328,7 +333,8 @@ fn why(method: Method, light: LightKind, direct: bool) -> &'static str {
 mod tests {
     use super::*;
 
-    const METHODS: [Method; 4] = [Method::Path, Method::Light, Method::Bidirectional, Method::Photon];
+    const METHODS: [Method; 5] =
+        [Method::Path, Method::Light, Method::Bidirectional, Method::Caustics, Method::Photon];
     const KINDS: [LightKind; 3] = [LightKind::Surface, LightKind::Environment, LightKind::Punctual];
     const EYES: [EyeKind; 3] = [EyeKind::Lens, EyeKind::Pinhole, EyeKind::Parallel];
     const LONGEST: usize = 7;
@@ -366,6 +372,11 @@ mod tests {
             Method::Path => techniques.any(|(s, t)| s <= 1 && t >= 2 && makes((s, t), word, light, eye)),
             Method::Light => techniques.any(|(s, t)| t == 1 && makes((s, t), word, light, eye)),
             Method::Bidirectional => techniques.any(|technique| makes(technique, word, light, eye)),
+            Method::Caustics => {
+                let casts = word.last().is_some_and(|letter| *letter != Letter::Diffuse);
+                let used = |(s, t)| s <= 1 && t >= 2 || s >= 2 && t == 1 && casts;
+                techniques.any(|technique| used(technique) && makes(technique, word, light, eye))
+            }
             _ => {
                 let gathers = word.iter().position(|letter| !letter.is_delta());
                 let hits = makes((0, vertices), word, light, eye);

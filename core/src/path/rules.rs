@@ -62,6 +62,9 @@ pub enum Weighing {
     All(Heuristic),
     /// Chosen techniques.
     Chosen(Chosen),
+    /// Light that is hit, next events, and, of light whose first surface is more than diffuse, joins to the lens. Whether it is one
+    /// can be told from both ends of a path.
+    Caustics,
 }
 
 impl Rules {
@@ -150,6 +153,7 @@ impl Rules {
             Weighing::ToLens => t == 1,
             Weighing::All(_) => t >= 1,
             Weighing::Chosen(chosen) => chosen.uses(s, t),
+            Weighing::Caustics => s <= 1 && t >= 2 || s >= 2 && t == 1,
         }
     }
 
@@ -179,6 +183,7 @@ fn weighing(settings: &Settings) -> Weighing {
         (Method::Bidirectional, Weights::Power) if settings.strategies.is_empty() => {
             Weighing::All(Heuristic::Power)
         }
+        (Method::Caustics, _) => Weighing::Caustics,
         (Method::Bidirectional, weights) => {
             Weighing::Chosen(Chosen::new(settings.strategies.clone(), weights))
         }

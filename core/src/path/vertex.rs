@@ -1,7 +1,7 @@
 //! A point of a path on a surface, and what it does to light.
 
 use crate::bsdf::Bsdf;
-use crate::bsdf::event::{Letter, SampleKind, Scattered, Transport};
+use crate::bsdf::event::{Letter, Letters, SampleKind, Scattered, Transport};
 use crate::math::colour::Rgb;
 use crate::math::cosine::cosine;
 use crate::path::rules::Rules;
@@ -78,6 +78,15 @@ impl Weight {
     }
 }
 
+/// What a surface makes of light that comes straight from its source.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cast {
+    /// It scatters it diffusely only.
+    Diffuse,
+    /// More than that: its lobes may throw it together somewhere.
+    Caustic,
+}
+
 /// On which side a path goes on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Crossing {
@@ -120,6 +129,12 @@ impl<'s> Vertex<'s> {
     /// Whether a next event can contribute.
     pub fn is_smooth(&self) -> bool {
         self.bsdf.is_smooth_anywhere()
+    }
+
+    /// What it makes of light that comes straight from its source: the same from wherever one looks.
+    #[inline]
+    pub fn cast(&self) -> Cast {
+        if Letters::of(Letter::Diffuse).contains(self.bsdf.letters()) { Cast::Diffuse } else { Cast::Caustic }
     }
 
     /// f · |cos θ| towards `direction`, by letter, and the density with which it would have been sampled; zero where

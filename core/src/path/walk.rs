@@ -10,7 +10,7 @@ use crate::path::mis::partial::Partial;
 use crate::path::rules::{Rules, Weighing};
 use crate::path::tally::Tally;
 use crate::path::throughput::{State, Throughput};
-use crate::path::vertex::{Continuation, Crossing, Density, Vertex};
+use crate::path::vertex::{Cast, Continuation, Crossing, Density, Vertex};
 use crate::sampler::{Dimension, Sampler, ScatteringNumbers, Use};
 use crate::scene::Scene;
 use crate::scene::interaction::Interaction;
@@ -62,6 +62,8 @@ pub struct Walk<'a, S: State, T: Throughput<S>> {
     pub sight: Sight,
     /// Its vertices so far, where weights are computed from all of them.
     pub links: Vec<Link>,
+    /// What the surface behind makes of light, where weights ask for that.
+    pub cast: Cast,
     transport: Transport,
     /// The part of its throughput that is due to refraction: it comes back when the path leaves.
     eta_squared: f32,
@@ -130,6 +132,11 @@ pub trait Visitor<'a, S: State, T: Throughput<S>> {
 
     /// The surface scatters.
     fn scatters(&mut self, walk: &Walk<'a, S, T>, vertex: &Vertex<'a>, tally: &mut Tally);
+
+    /// Whether where the walk goes on from there is of interest.
+    fn leaves(&self, _: &Walk<'a, S, T>, _: &Vertex<'a>) -> bool {
+        true
+    }
 }
 
 impl<'a, S: State, T: Throughput<S>> Walk<'a, S, T> {
@@ -155,6 +162,7 @@ impl<'a, S: State, T: Throughput<S>> Walk<'a, S, T> {
             mirrored: 0,
             sight: Sight::Clear,
             links: Vec::new(),
+            cast: Cast::Diffuse,
             transport,
             eta_squared: 1.0,
             scale,
@@ -187,7 +195,7 @@ impl<'a, S: State, T: Throughput<S>> Walk<'a, S, T> {
             let Some(vertex) = Vertex::new(at, -self.edge.ray.direction, self.rules) else { return };
             self.numbers = self.sampler.scattering(|what| self.dimension(what));
             visitor.scatters(&self, &vertex, tally);
-            if !self.scatter(&vertex, visitor) {
+            if !visitor.leaves(&self, &vertex) || !self.scatter(&vertex, visitor) {
                 return;
             }
         }
@@ -199,6 +207,12 @@ impl<'a, S: State, T: Throughput<S>> Walk<'a, S, T> {
             Transport::Radiance => Dimension::Eye(self.scatterings, what),
             Transport::Importance => Dimension::Light(self.scatterings, what),
         }
+    }
+
+    /// What is behind the surface that the walk is at where two surfaces are never joined: only the techniques of its first two vertices.
+    pub fn without_inner_joints(&self) -> Partial {
+        let near = if self.scatterings == 0 { self.partial.near } else { 0.0 };
+        Partial { near, ..self.partial }
     }
 
     /// Whether weights are computed from all densities.
@@ -311,6 +325,12 @@ impl<'a, S: State, T: Throughput<S>> Walk<'a, S, T> {
         cos: f64,
     ) {
         let h = self.rules.heuristic();
+        if matches!(self.rules.weighing, Weighing::Caustics) {
+            self.cast = vertex.cast();
+            if self.scatterings > 1 {
+                self.partial.near = 0.0;
+            }
+        }
         let Density::SolidAngle(forward) = density else {
             self.partial.scatter_specular(h, cos);
             self.remember(1.0, density);

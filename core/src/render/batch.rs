@@ -1,5 +1,6 @@
 //! One batch: tiles on the threads of a pool, added in their order.
 
+use crate::film::allocation::Allocation;
 use crate::film::batch::Batch;
 use crate::film::invalid::InvalidSamples;
 use crate::film::size::Region;
@@ -41,7 +42,19 @@ pub fn render(
     batch: Batch,
     progress: &Progress,
 ) -> Result<Sum, RenderError> {
-    render_by(Kernel::Fitting, prepared, settings, batch, progress)
+    render_allocated(prepared, settings, batch, None, progress)
+}
+
+/// The same of a batch whose pixels have as many of its samples as they are allocated. Only for methods whose samples stay in
+/// their pixel.
+pub fn render_allocated(
+    prepared: &Prepared,
+    settings: &Settings,
+    batch: Batch,
+    allocation: Option<&Allocation>,
+    progress: &Progress,
+) -> Result<Sum, RenderError> {
+    run_by(Kernel::Fitting, prepared, settings, (batch, allocation), progress)
 }
 
 /// The same by a kernel of choice, to compare them.
@@ -52,11 +65,25 @@ pub fn render_by(
     batch: Batch,
     progress: &Progress,
 ) -> Result<Sum, RenderError> {
+    run_by(kernel, prepared, settings, (batch, None), progress)
+}
+
+fn run_by(
+    kernel: Kernel,
+    prepared: &Prepared,
+    settings: &Settings,
+    (batch, allocation): (Batch, Option<&Allocation>),
+    progress: &Progress,
+) -> Result<Sum, RenderError> {
     assert!(batch.region.is_in(settings.size), "the batch's region is not in the frame");
+    assert!(
+        allocation.is_none_or(|a| a.frame() == settings.size && !settings.method.splats()),
+        "an allocation for another frame, or for a method whose samples reach any pixel"
+    );
     let scene = &prepared.scene;
     let rules = Rules::new(scene, settings, batch.region.pixels())?;
     let radiosity = prepared.radiosity.as_deref();
-    let sampling = Sampling { scene, radiosity, settings, rules: &rules, batch };
+    let sampling = Sampling { scene, radiosity, settings, rules: &rules, batch, allocation };
     if kernel == Kernel::Fitting && rules.is_everything() {
         run::<Everything>(&sampling, progress)
     } else {
@@ -69,7 +96,7 @@ where
     C::Light: Send + Sync,
 {
     match sampling.settings.method {
-        Method::Light | Method::Bidirectional => splats::render::<C>(sampling, progress),
+        Method::Light | Method::Bidirectional | Method::Caustics => splats::render::<C>(sampling, progress),
         Method::Photon => passes::render::<C>(sampling, progress),
         _ => tile::render::<C>(sampling, progress),
     }
@@ -101,10 +128,20 @@ impl Canvas {
     }
 
     pub(super) fn finish(self, batch: Batch, invalid: InvalidSamples, rays: u64) -> Sum {
+        self.finish_with(batch, invalid, rays, Vec::new())
+    }
+
+    pub(super) fn finish_with(
+        self,
+        batch: Batch,
+        invalid: InvalidSamples,
+        rays: u64,
+        tile_rays: Vec<u32>,
+    ) -> Sum {
         // What f64 holds but f32 does not is as bright as f32 can be: a partial sum must stay finite.
         let narrow = |sum: [f64; 3]| sum.map(|c| c.min(f64::from(f32::MAX)) as f32);
         let planes: Vec<Plane> =
             self.planes.into_iter().map(|plane| plane.into_iter().map(narrow).collect()).collect();
-        Sum { batch, planes, invalid, rays }
+        Sum { batch, planes, invalid, rays, tile_rays }
     }
 }

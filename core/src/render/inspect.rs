@@ -93,13 +93,16 @@ fn brightest(data: &SceneData) -> f64 {
     data.materials.iter().map(|m| f64::from(m.emission.factor.max_element())).fold(sky, f64::max)
 }
 
+/// Whether some of these surfaces are more than diffuse: what they make of light is met by chance, and a caustic.
+pub fn casts(letters: Letters) -> bool {
+    letters != Letters::of(Letter::Diffuse) && letters != Letters::NONE
+}
+
 /// The brightest that a sample can be which meets a light by chance only: as bright as the brightest light, where eye subpaths may
 /// come to it by a glossy or specular surface. Lights without extent are never met by chance.
 pub fn by_chance(method: Method, letters: Letters, brightest: f64) -> Option<f64> {
     let met = match method {
-        Method::Path | Method::Bidirectional => {
-            letters != Letters::of(Letter::Diffuse) && letters != Letters::NONE
-        }
+        Method::Path | Method::Bidirectional | Method::Caustics => casts(letters),
         Method::Light | Method::Photon | Method::Radiosity => false,
     };
     (met && brightest > 0.0).then_some(brightest)

@@ -25,13 +25,14 @@ const SHARE: f64 = 0.02;
 const REPLICATES: u32 = 8;
 /// Blocks of a sequence: each but the first doubles its samples.
 const BLOCKS_MAX: u32 = 4;
-/// Fewest pixels of a pilot's pictures.
-const PIXELS_MIN: f64 = 64.0;
+/// Fewest pixels of a pilot's pictures: with 120 of them and a sample by each sequence, what was taken was worse on average than what is
+/// taken untried.
+const PIXELS_MIN: f64 = 192.0;
+/// Fewer pixels than these tell little.
+const PIXELS_FEW: usize = 2000;
 /// Most pixels of a pilot's pictures. They should be as small as the job's: edges are noise that all methods share, and there is
 /// the more of it the larger pixels are, which speaks for the method with the cheapest samples.
 const PIXELS_MAX: f64 = 3600.0;
-/// A sample by each of all methods in samples of `path`, where nothing is known yet.
-const ALL_METHODS: f64 = 6.0;
 /// Reading a triangle and building its part of a tree, in samples of `path`.
 const TRIANGLE: f64 = 0.5;
 /// Samples of `path` that a second of run time is taken for.
@@ -42,11 +43,14 @@ const TRIANGLES_MAX: u64 = 1 << 20;
 const PATH_RAYS_MAX: f64 = 64.0;
 /// Work of a pilot, at most, in microseconds of a thread: one who submits a job waits for it, and sees its picture first.
 const WORK_MAX: f64 = 1.25e6;
-/// Another method is taken where it needs less than so many times the first one's work.
+/// Another method than the one that is taken untried is taken where it needs less than so many times its work.
 const GAIN: f64 = 0.95;
-/// The same where the first one meets light by chance: what few samples tell of its error is mostly too little. In the bundled room and
-/// in a caustic, pilots said 1.0 and 1.2, and long renders 0.3 and 0.004.
-const GAIN_BY_CHANCE: f64 = 1.5;
+/// The same by few pixels where that is `path` and misses nothing: by single samples it seems worse than it is, as its error falls the
+/// fastest with more of them.
+const GAIN_BY_FEW: f64 = 0.85;
+/// What the first method's work counts where it meets light by chance: what few samples tell of its error is mostly too little. In the
+/// bundled room and in a caustic, pilots said 1.5 and 1.6 times the work of the best, and long renders 4 and 200.
+const BY_CHANCE: f64 = 2.0;
 
 /// How eye subpaths come to light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -87,7 +91,17 @@ impl Plan {
 
     /// Pixels that may be tried: two blocks of them, so that there is something to go by.
     fn pixels(&self) -> f64 {
-        SHARE * self.job() / (2.0 * f64::from(REPLICATES) * ALL_METHODS)
+        let all: f64 = self.methods.iter().map(|method| dearness(*method)).sum();
+        SHARE * self.job() / (2.0 * f64::from(REPLICATES) * all)
+    }
+
+    /// What is taken where nothing is tried: the first, or `caustics` where that one meets light by chance. It needs twice the work at
+    /// most, and can need hundreds of times less.
+    pub fn untried(&self) -> Method {
+        match self.chance {
+            Chance::Sometimes if self.methods.contains(&Method::Caustics) => Method::Caustics,
+            _ => self.methods[0],
+        }
     }
 
     /// Whether there is work enough for a pilot, before anything is read.
@@ -159,31 +173,45 @@ pub struct Trial {
 }
 
 impl Trial {
-    /// The work for an error is in proportion to it. Where a few samples make the error there are more of them to come, so that a
-    /// standard error is added.
+    /// The work for an error is in proportion to it.
     fn cost(&self) -> f64 {
-        let square = self.relative_error * self.relative_error + self.square_error;
-        let cost = (square + self.missed * self.missed) * self.work;
+        let square = self.relative_error * self.relative_error + self.missed * self.missed;
+        let cost = square * self.work;
         if cost.is_finite() { cost } else { f64::MAX }
     }
 }
 
-/// The trial to go by: the first, where no other is good enough.
-fn chosen(trials: &[Trial], chance: Chance) -> &Trial {
-    let gain = match chance {
-        Chance::Never => GAIN,
-        Chance::Sometimes => GAIN_BY_CHANCE,
+/// The trial to go by, in pictures of so many pixels: that of the method that is taken untried, where no other is good enough.
+fn chosen<'t>(trials: &'t [Trial], plan: &Plan, pixels: usize) -> &'t Trial {
+    let untried = plan.untried();
+    let gain = match plan.chance {
+        Chance::Never if pixels < PIXELS_FEW => GAIN_BY_FEW,
+        _ => GAIN,
     };
-    let first = &trials[0];
-    let others = trials[1..].iter().filter(|trial| trial.cost() < gain * first.cost());
-    others.min_by(|a, b| a.cost().total_cmp(&b.cost())).unwrap_or(first)
+    let counts = |trial: &Trial| {
+        let by_chance = plan.chance == Chance::Sometimes && trial.method == plan.methods[0];
+        let chance = if by_chance { BY_CHANCE } else { 1.0 };
+        let gain = if trial.method == untried { gain } else { 1.0 };
+        chance * gain * trial.cost()
+    };
+    let least = trials.iter().min_by(|a, b| counts(a).total_cmp(&counts(b)));
+    least.expect("each method of a plan was tried")
+}
+
+/// A sample in samples of `path`, where nothing is known yet.
+fn dearness(method: Method) -> f64 {
+    match method {
+        Method::Bidirectional => 3.5,
+        Method::Caustics => 2.0,
+        Method::Path | Method::Light | Method::Photon | Method::Radiosity => 1.25,
+    }
 }
 
 /// How long a batch takes, in microseconds of one thread: what `cargo run --release -p ovtigre-tests --bin auto` measured.
 fn work(method: Method, rays: u64, samples: f64) -> f64 {
     let [a_ray, a_sample] = match method {
         Method::Light => [0.3, 1.2],
-        Method::Bidirectional => [0.5, 0.0],
+        Method::Bidirectional | Method::Caustics => [0.5, 0.0],
         Method::Path | Method::Photon | Method::Radiosity => [0.56, 0.0],
     };
     a_ray * rays as f64 + a_sample * samples
@@ -341,7 +369,7 @@ impl Trying<'_> {
         let share = (self.spent() / self.job_work(job)).min(f64::MAX);
         let trials = self.trials();
         let (method, least) = {
-            let chosen = chosen(&trials, self.plan.chance);
+            let chosen = chosen(&trials, self.plan, self.region.pixels());
             (chosen.method, chosen.cost())
         };
         let mut pilot = Pilot { method, size, trials, share };

@@ -74,7 +74,7 @@ pub fn prepare(
             let scatterings = Reconstruction::Gather.scatterings(settings.bounces);
             Some(Arc::new(Solution::new(&scene, settings.shadows, scatterings, Fineness::default())?))
         }
-        Method::Path | Method::Light | Method::Bidirectional | Method::Photon => None,
+        Method::Path | Method::Light | Method::Bidirectional | Method::Caustics | Method::Photon => None,
     };
     Ok(Prepared { scene, radiosity })
 }

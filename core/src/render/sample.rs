@@ -1,17 +1,20 @@
 //! One sample by the settings' method.
 
+use crate::film::allocation::Allocation;
 use crate::film::batch::Batch;
+use crate::film::grid::Grid;
 use crate::method::radiosity::Reconstruction;
-use crate::method::{bidirectional, camera::camera_ray, light, path, radiosity};
+use crate::method::{bidirectional, camera::camera_ray, caustics, light, path, radiosity};
 use crate::path::rules::Rules;
 use crate::path::tally::Tally;
 use crate::path::throughput::Carriage;
 use crate::radiosity::solution::Solution;
 use crate::sampler::{Dimension, Sampler};
 use crate::scene::{Scene, Unlit};
-use crate::settings::{Method, Settings};
+use crate::settings::{Distribution, Method, Settings};
 use crate::trace::moment::Moment;
 use crate::trace::ray::Ray;
+use std::ops::Range;
 
 /// All that a sample depends on beside its pixel and index.
 #[derive(Clone, Copy, Debug)]
@@ -22,9 +25,25 @@ pub(super) struct Sampling<'a> {
     pub(super) settings: &'a Settings,
     pub(super) rules: &'a Rules,
     pub(super) batch: Batch,
+    /// How many samples of the batch each pixel has; all of them where there is none.
+    pub(super) allocation: Option<&'a Allocation>,
 }
 
 impl Sampling<'_> {
+    /// Sample indices of a pixel.
+    pub(super) fn samples(&self, pixel: [u32; 2]) -> Range<u32> {
+        match self.allocation {
+            Some(allocation) => allocation.samples(allocation.grid().tile(pixel), self.batch.block),
+            None => self.batch.block.samples(),
+        }
+    }
+
+    /// The tiles whose rays are counted, if an allocation is to be made of this batch and its like.
+    pub(super) fn counted(&self) -> Option<Grid> {
+        let adaptive = self.settings.sampling == Distribution::Adaptive && self.allocation.is_none();
+        adaptive.then(|| Grid::of(self.settings.size))
+    }
+
     /// Adds the sample of a pixel with an index to `tally`.
     pub(super) fn sample<C: Carriage>(&self, pixel: [u32; 2], index: u32, tally: &mut Tally) {
         let Self { scene, settings, rules, .. } = *self;
@@ -45,6 +64,11 @@ impl Sampling<'_> {
                 let (eye, ray) = self.eye(pixel, index);
                 let light = self.light(pixel, index);
                 bidirectional::sample::<C>(scene, rules, ray, [&eye, &light], tally);
+            }
+            Method::Caustics => {
+                let (eye, ray) = self.eye(pixel, index);
+                let light = self.light(pixel, index);
+                caustics::sample::<C>(scene, rules, ray, [&eye, &light], tally);
             }
             Method::Radiosity => {
                 let solution = self.radiosity.expect("prepared for this method");

@@ -65,6 +65,13 @@ impl Default for Guarding {
 pub struct Caller {
     /// The id of its token; `None` where none is needed.
     pub token: Option<String>,
+    /// What it may do.
+    pub role: Role,
+}
+
+impl Caller {
+    /// Of a farm that asks for no token.
+    const ANYBODY: Self = Self { token: None, role: Role::Admin };
 }
 
 /// Lets callers in.
@@ -97,10 +104,10 @@ impl Guard {
     async fn check(&self, access: Access, headers: &HeaderMap) -> Result<Caller, ApiError> {
         if !self.needs_tokens().await? {
             self.host(headers)?;
-            return Ok(Caller { token: None });
+            return Ok(Caller::ANYBODY);
         }
         if access == Access::Open {
-            return Ok(Caller { token: None });
+            return Ok(Caller::ANYBODY);
         }
         let Some(hash) = bearer(headers) else {
             return Err(unauthorized("a token is needed: send 'Authorization: Bearer TOKEN'"));
@@ -115,7 +122,7 @@ impl Guard {
         if !access.is_work() {
             self.pace(&hash)?;
         }
-        Ok(Caller { token: Some(id) })
+        Ok(Caller { token: Some(id), role })
     }
 
     async fn needs_tokens(&self) -> Result<bool, ApiError> {

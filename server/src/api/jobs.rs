@@ -113,6 +113,22 @@ enum Sort {
     Priority,
     #[serde(rename = "-priority")]
     PriorityDown,
+    #[serde(rename = "error")]
+    Error,
+    #[serde(rename = "-error")]
+    ErrorDown,
+    #[serde(rename = "progress")]
+    Progress,
+    #[serde(rename = "-progress")]
+    ProgressDown,
+    #[serde(rename = "eta")]
+    Eta,
+    #[serde(rename = "-eta")]
+    EtaDown,
+    #[serde(rename = "workers")]
+    Workers,
+    #[serde(rename = "-workers")]
+    WorkersDown,
 }
 
 impl From<Sort> for Order {
@@ -126,6 +142,14 @@ impl From<Sort> for Order {
             Sort::StateDown => (Key::State, Way::Down),
             Sort::Priority => (Key::Priority, Way::Up),
             Sort::PriorityDown => (Key::Priority, Way::Down),
+            Sort::Error => (Key::Error, Way::Up),
+            Sort::ErrorDown => (Key::Error, Way::Down),
+            Sort::Progress => (Key::Progress, Way::Up),
+            Sort::ProgressDown => (Key::Progress, Way::Down),
+            Sort::Eta => (Key::Eta, Way::Up),
+            Sort::EtaDown => (Key::Eta, Way::Down),
+            Sort::Workers => (Key::Workers, Way::Up),
+            Sort::WorkersDown => (Key::Workers, Way::Down),
         };
         Self { by, way }
     }
@@ -141,7 +165,10 @@ pub struct ListParams {
     #[schemars(length(max = 200))]
     text: Option<String>,
     /// What they go by, `-created` where it is not said: the newest first. Names go by their letters, A to Z like a to z, states
-    /// by their names; a minus turns the order round. Jobs that are alike go by when they came, the same way.
+    /// by their names; a minus turns the order round. Jobs that are alike go by when they came, the same way. `error` is the relative
+    /// error at the latest checkpoint, `progress` the part of the samples that is drawn, `eta` when a running job is expected to be
+    /// done, `workers` how many hold batches of it; without an error or an expected end it is as if that were endless. These four
+    /// follow a job about once a second, so that one may be met on two pages, or on none, while it is rendered.
     sort: Option<Sort>,
     /// Items at most.
     #[schemars(range(min = 1, max = 500))]

@@ -1,11 +1,13 @@
 //! Doors: HTTP to farm and back, no rules.
 
 pub mod body;
+pub mod caller;
 pub mod carry_out;
 pub mod curve;
 pub mod error;
 pub mod events;
 pub mod guard;
+mod heads;
 pub mod health;
 pub mod image;
 pub mod jobs;
@@ -53,6 +55,7 @@ pub fn router(farm: Arc<Farm>, guarding: Guarding) -> Router {
         .route("/v1/leases/{id}/sum", put(leases::sum).post(leases::handed))
         .route("/v1/leases/{id}/failure", post(leases::failure))
         .route("/v1/scaling", get(health::scaling))
+        .route("/v1/caller", get(caller::get))
         .route("/healthz", get(health::alive))
         .route("/readyz", get(health::ready))
         .route("/metrics", get(health::metrics))

@@ -1,6 +1,8 @@
 //! The interface as an `OpenAPI` 3.1 document, made from the types that it speaks and the list of its doors.
 
 use super::{
+    caller::CallerStatus,
+    heads::{OF_PROBLEMS, headers, heads_of},
     image::PngParams,
     jobs::{CreateParams, DeleteParams, DryRun, ListParams},
     params::PageParams,
@@ -259,6 +261,7 @@ fn of_workers(method: &Method, path: &str) -> Option<Operation> {
 fn of_the_farm(path: &str) -> Option<Operation> {
     let (id, summary, content) = match path {
         "/v1/scaling" => ("getScaling", "How many workers the queue could use now", json::<Scaling>()),
+        "/v1/caller" => ("getCaller", "What the token of this call may do", json::<CallerStatus>()),
         "/healthz" => ("getHealth", "Whether the process runs", TEXT),
         "/readyz" => ("getReadiness", "Whether the farm can be used", TEXT),
         "/metrics" => ("getMetrics", "Numbers for Prometheus (text format 0.0.4)", TEXT),
@@ -380,6 +383,10 @@ fn described(generator: &mut SchemaGenerator, path: &str, access: Access, operat
         if let Some(content) = content(generator, *of) {
             response["content"] = content;
         }
+        let heads = heads_of(operation.id, *status);
+        if !heads.is_empty() {
+            response["headers"] = headers(heads);
+        }
         responses.insert(status.to_string(), response);
     }
     responses.insert("default".to_owned(), json!({"$ref": "#/components/responses/Problem"}));
@@ -456,6 +463,7 @@ fn document() -> Value {
             "schemas": generator.take_definitions(true),
             "responses": {"Problem": {
                 "description": "What went wrong (RFC 9457)",
+                "headers": headers(&OF_PROBLEMS),
                 "content": {"application/problem+json": {"schema": problem}},
             }},
             "securitySchemes": {"token": {"type": "http", "scheme": "bearer"}},

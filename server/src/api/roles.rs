@@ -19,7 +19,7 @@ const FILES: Access = Access::Roles(&[Role::Read, Role::Submit, Role::Work]);
 const ADMIN: Access = Access::Roles(&[]);
 
 /// Every door: method, path as the router has it, and who may use it. `HEAD` is as `GET`.
-pub const DOORS: [(Method, &str, Access); 31] = [
+pub const DOORS: [(Method, &str, Access); 32] = [
     (Method::POST, "/v1/scenes", SUBMIT),
     (Method::PUT, "/v1/scenes/{id}", SUBMIT),
     (Method::GET, "/v1/scenes/{id}", FILES),
@@ -45,6 +45,7 @@ pub const DOORS: [(Method, &str, Access); 31] = [
     (Method::POST, "/v1/leases/{id}/sum", WORK),
     (Method::POST, "/v1/leases/{id}/failure", WORK),
     (Method::GET, "/v1/scaling", READ),
+    (Method::GET, "/v1/caller", FILES),
     (Method::GET, "/metrics", READ),
     (Method::GET, "/healthz", Access::Open),
     (Method::GET, "/readyz", Access::Open),

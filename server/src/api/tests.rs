@@ -26,7 +26,10 @@ use ovtigre_proto::{
     status::JobState,
 };
 use serde_json::{Value, json};
-use std::{sync::Arc, time::Duration};
+use std::{
+    sync::{Arc, LazyLock},
+    time::Duration,
+};
 use tower::ServiceExt as _;
 
 struct Answer {
@@ -51,6 +54,30 @@ impl Answer {
         assert_eq!((self.status.as_u16(), problem.status), (status, status), "{problem:?}");
         assert_eq!(problem.kind, format!("/problems/{kind}"), "{problem:?}");
         problem
+    }
+}
+
+/// Headers that say something to a client are in the interface's document.
+fn heads_are_described(method: &Method, path: &str, status: StatusCode, headers: &axum::http::HeaderMap) {
+    static DOCUMENT: LazyLock<Value> =
+        LazyLock::new(|| serde_json::from_str(&super::openapi::DOCUMENT).unwrap());
+    let path = path.split('?').next().unwrap();
+    let parts = |path: &str| path.split('/').map(ToOwned::to_owned).collect::<Vec<_>>();
+    let same = |door: &str| {
+        let (door, path) = (parts(door), parts(path));
+        door.len() == path.len() && door.iter().zip(&path).all(|(of, is)| of == is || of == "{id}")
+    };
+    let Some(door) = DOORS.iter().find(|(of, door, _)| of == method && same(door)) else { return };
+    let operation = &DOCUMENT["paths"][door.1][method.as_str().to_ascii_lowercase()];
+    let problem = &DOCUMENT["components"]["responses"]["Problem"];
+    let response = operation["responses"].get(status.as_str()).unwrap_or(problem);
+    let said: Vec<String> = response["headers"]
+        .as_object()
+        .map_or_else(Vec::new, |heads| heads.keys().map(|name| name.to_ascii_lowercase()).collect());
+    for name in headers.keys().map(axum::http::HeaderName::as_str) {
+        let of_page = ["/", "/docs", "/openapi.json"].contains(&door.1);
+        let plain = matches!(name, "content-type" | "content-length" | "cache-control" | "allow");
+        assert!(of_page || plain || said.iter().any(|one| one == name), "{method} {path} {status}: {name}");
     }
 }
 
@@ -81,13 +108,14 @@ impl Doors {
         heads: &[(&str, &str)],
         body: impl Into<Body>,
     ) -> Answer {
-        let mut request = Request::builder().method(method).uri(path);
+        let mut request = Request::builder().method(method.clone()).uri(path);
         for (name, value) in heads {
             request = request.header(*name, *value);
         }
         let response = self.call(request.body(body.into()).unwrap()).await;
         let (parts, body) = response.into_parts();
         let body = axum::body::to_bytes(body, usize::MAX).await.unwrap();
+        heads_are_described(&method, path, parts.status, &parts.headers);
         Answer { status: parts.status, headers: parts.headers, body }
     }
 
@@ -535,6 +563,9 @@ async fn every_door_is_open_to_its_roles_and_to_nobody_else() {
         for (role, token) in &tokens {
             let bearer = format!("Bearer {token}");
             let answer = send(&[("authorization", &bearer)]).await;
+            if path == "/v1/caller" {
+                assert_eq!(answer.json(), json!({"role": role.name()}));
+            }
             if access.allows(*role) {
                 assert!(![401, 403, 500].contains(&answer.status.as_u16()), "{method} {path} {role:?}");
             } else {
@@ -757,6 +788,60 @@ async fn jobs_are_listed_page_by_page_in_the_order_asked_for() {
             query = format!("?limit=2{sort}&cursor={next}");
         }
         assert_eq!(found, order.map(|i| expected[i].clone()), "{sort}");
+    }
+}
+
+/// What jobs are listed by, as it is shown of them.
+fn shown(job: &Value, sort: &str) -> f64 {
+    let endless = |value: &Value| value.as_f64().unwrap_or(f64::INFINITY);
+    match sort {
+        "error" => endless(&job["error"]["relative_error"]),
+        "eta" => endless(&job["eta_seconds"]),
+        "workers" => job["workers"].as_f64().unwrap(),
+        _ if job["state"] == "done" => 1.0,
+        _ => job["samples_done"].as_f64().unwrap() / job["samples_asked"].as_f64().unwrap(),
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn jobs_are_listed_by_what_changes_while_they_are_rendered() {
+    let doors = Doors::open().await;
+    let done = doors.job(4).await;
+    doors.finish(&done).await;
+    let running = doors.job(1 << 12).await;
+    let worker = doors.bench.worker().await;
+    let leases = doors.bench.take(&worker, 5).await;
+    for lease in &leases[..4] {
+        doors.bench.bring(lease, Spread::Noisy).await;
+    }
+    doors.bench.until(&running, |status| status.samples_done > 0.0 && status.error.is_some()).await;
+    doors.job(4).await;
+    for sort in ["error", "progress", "eta", "workers"] {
+        // They follow about once a second.
+        for tries in 0.. {
+            assert!(tries < 200, "{sort}");
+            let mut pages = Vec::new();
+            for (minus, cursor) in [("", ""), ("-", ""), ("", "&limit=1")] {
+                let page = doors.get(&format!("/v1/jobs?sort={minus}{sort}{cursor}")).await.json();
+                pages.push(page);
+            }
+            let next = pages[2]["next"].as_str().unwrap();
+            pages[2] = doors.get(&format!("/v1/jobs?sort={sort}&cursor={next}")).await.json();
+            let values = |page: &Value| -> Vec<f64> {
+                page["items"].as_array().unwrap().iter().map(|job| shown(job, sort)).collect()
+            };
+            let ids = |page: &Value| -> Vec<Value> {
+                page["items"].as_array().unwrap().iter().map(|job| job["id"].clone()).collect()
+            };
+            let (up, rest) = (values(&pages[0]), ids(&pages[0])[1..].to_vec());
+            let down: Vec<_> = ids(&pages[1]).into_iter().rev().collect();
+            if up.is_sorted() && up[0] < up[2] && ids(&pages[0]) == down && ids(&pages[2]) == rest {
+                break;
+            }
+            // A worker that is not heard of loses what it holds.
+            doors.bench.beat(&worker, &leases[4]).await;
+            tokio::time::sleep(Duration::from_millis(50)).await;
+        }
     }
 }
 

@@ -12,8 +12,8 @@ use ovtigre_core::{
     radiosity::{fineness::Fineness, solution::Solution},
     render::prepare::open,
     settings::{
-        CameraChoice, Environment, EnvironmentSource, FULL, Gloss, Method, Settings, Shadows, Shutter,
-        Weights,
+        CameraChoice, Distribution, Environment, EnvironmentSource, FULL, Gloss, Method, Settings, Shadows,
+        Shutter, Weights,
     },
 };
 use ovtigre_proto::pair::radiance;
@@ -193,6 +193,7 @@ fn settings(environment: Option<EnvironmentSource>, rotation_degrees: f64) -> Se
         shadows: Shadows::On,
         seed: 0,
         replicates: 1,
+        sampling: Distribution::Uniform,
     }
 }
 

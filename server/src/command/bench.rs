@@ -17,7 +17,7 @@ use ovtigre_core::{
     film::{reference::Reference, size::Size},
     gltf::limits::Limits,
     render::inspect::{Contents, by_chance, inspect},
-    settings::{CameraChoice, FULL, Gloss, Method, Settings, Shadows, Shutter, Weights},
+    settings::{CameraChoice, Distribution, FULL, Gloss, Method, Settings, Shadows, Shutter, Weights},
 };
 use std::{
     num::NonZeroUsize,
@@ -40,7 +40,7 @@ pub(crate) struct Bench {
     #[arg(value_name = "SCENE", required = true)]
     scenes: Vec<PathBuf>,
     /// Methods to compare.
-    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "path,light,bidirectional", value_parser = method)]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "path,light,bidirectional,caustics", value_parser = method)]
     methods: Vec<Method>,
     /// Run time of each method on each scene: 60, 60s, 2m.
     #[arg(long, value_name = "TIME", default_value = "60s", value_parser = seconds)]
@@ -204,6 +204,7 @@ impl Bench {
             shadows: Shadows::On,
             seed: self.seed,
             replicates: self.replicates,
+            sampling: Distribution::Uniform,
         };
         let by_chance = by_chance(method, contents.letters, contents.brightest);
         Plan { settings, budget: self.budget, samples: SAMPLES_MAX, by_chance }
@@ -245,9 +246,10 @@ fn method(text: &str) -> Result<Method, String> {
         "path" => Ok(Method::Path),
         "light" => Ok(Method::Light),
         "bidirectional" => Ok(Method::Bidirectional),
+        "caustics" => Ok(Method::Caustics),
         "photon" => Ok(Method::Photon),
         "radiosity" => Ok(Method::Radiosity),
-        _ => Err("methods are path, light, bidirectional, photon and radiosity".to_owned()),
+        _ => Err("methods are path, light, bidirectional, caustics, photon and radiosity".to_owned()),
     }
 }
 

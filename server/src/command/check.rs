@@ -9,7 +9,7 @@ use ovtigre_core::{
         expression::language::Language,
         reach::{Unreachable, unreachable},
     },
-    render::inspect::{Contents, inspect},
+    render::inspect::{Contents, casts, inspect},
     settings::{FULL, Method},
 };
 use serde::Serialize;
@@ -79,13 +79,14 @@ fn document(contents: &Contents) -> Document<'_> {
 }
 
 /// Methods that a render with default flags chooses from.
-const OPEN: [Method; 3] = [Method::Path, Method::Bidirectional, Method::Light];
+const OPEN: [Method; 4] = [Method::Path, Method::Bidirectional, Method::Caustics, Method::Light];
 
 /// Of them those that make the most of the paths that are asked for, and what they do not make.
 fn methods(contents: &Contents) -> (Vec<Method>, Vec<Unreachable>) {
     let language = Language::compile(&[FULL]).expect("the default is an expression");
     let around = contents.surroundings(&language.tags().collect::<Vec<_>>());
-    let by = OPEN.map(|method| (method, unreachable(&language, method, &around, None)));
+    let open = OPEN.into_iter().filter(|method| *method != Method::Caustics || casts(contents.letters));
+    let by: Vec<_> = open.map(|method| (method, unreachable(&language, method, &around, None))).collect();
     let (_, fewest) = by.iter().min_by_key(|(_, missing)| lost(missing)).expect("there are methods");
     let best = by.iter().filter(|(_, missing)| lost(missing) == lost(fewest));
     (best.map(|(method, _)| *method).collect(), fewest.clone())

@@ -7,7 +7,7 @@ use clap::{
 use ovtigre_core::{
     film::size::{Region, Size},
     path::expression::language::Language,
-    settings::Shadows,
+    settings::{Distribution, Shadows},
 };
 use ovtigre_proto::{
     id::BlobId,
@@ -50,7 +50,7 @@ pub(crate) struct JobFlags {
     #[arg(long, value_name = "NAME", value_parser = ["phong", "whitted", "cook", "radiosity", "full"])]
     pub(crate) preset: Option<String>,
     /// How light is estimated [default: auto].
-    #[arg(long, value_parser = named::<MethodRequest>(&["auto", "path", "light", "bidirectional", "photon", "radiosity"]))]
+    #[arg(long, value_parser = named::<MethodRequest>(&["auto", "path", "light", "bidirectional", "caustics", "photon", "radiosity"]))]
     pub(crate) method: Option<MethodRequest>,
     /// A further picture of only those paths, or of a technique (s,t) of bidirectional; `lights` is one for each light that has a name; repeatable.
     #[arg(long = "layer", value_name = "NAME=EXPR", value_parser = layer)]
@@ -82,6 +82,9 @@ pub(crate) struct JobFlags {
     /// Whether direct light is blocked [default: on].
     #[arg(long, value_parser = named::<Shadows>(&["on", "off"]))]
     pub(crate) shadows: Option<Shadows>,
+    /// Which pixels get how many samples: all the same, or more where they lessen the error more [default: uniform].
+    #[arg(long, value_parser = named::<Distribution>(&["uniform", "adaptive"]))]
+    pub(crate) sampling: Option<Distribution>,
     /// Chooses the random sequences [default: 0].
     #[arg(long, value_name = "N")]
     pub(crate) seed: Option<u64>,
@@ -148,6 +151,7 @@ impl JobFlags {
             environment,
             environment_rotation: self.environment_rotation,
             shadows: self.shadows,
+            sampling: self.sampling,
             seed: self.seed,
             replicates: self.replicates,
             region: self.region,
@@ -238,7 +242,7 @@ mod tests {
         let request = parse(
             "--size 640x480 --camera 2 --variant red --samples 64 --error 0.01 --seconds 60 --paths LDE --method light
              --layer a=LE --layer b=LDE --strategies 0,3;1,2 --weights power --bounces 3 --lens-radius 0.01
-             --focus-distance 2 --shutter -1,0.5 --shadows off --seed 7 --replicates 8 --region 1,2,3,4",
+             --focus-distance 2 --shutter -1,0.5 --shadows off --sampling adaptive --seed 7 --replicates 8 --region 1,2,3,4",
         )
         .unwrap();
         assert_eq!(request.size, Some(Size { width: 640, height: 480 }));
@@ -248,6 +252,7 @@ mod tests {
         );
         assert_eq!((request.shutter, request.shadows), (Some([-1.0, 0.5]), Some(Shadows::Off)));
         assert_eq!(request.variant.as_deref(), Some("red"));
+        assert_eq!(request.sampling, Some(Distribution::Adaptive));
         assert_eq!((request.layers.len(), request.region.map(|r| r.height)), (2, Some(4)));
         let text = serde_json::to_string(&request).unwrap();
         assert_eq!(serde_json::from_str::<JobRequest>(&text).unwrap(), request);

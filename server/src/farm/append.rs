@@ -3,8 +3,10 @@
 
 use super::{
     Farm,
+    allocation::Decision,
     error::{FarmError, Result},
     live::{Arrival, Live, View, sum_bytes},
+    source::Source,
     split::lanes,
     stop::can_end,
 };
@@ -13,9 +15,8 @@ use crate::{
     fail_point::FailPoint,
     store::row::{BatchKey, CommitRow, Lane, Progress},
 };
-use bytes::Bytes;
-use ovtigre_core::film::{append::Prefix, exr, schedule::Schedule, sum::Sum};
-use ovtigre_proto::id::{BlobId, JobId};
+use ovtigre_core::film::{append::Prefix, schedule::Schedule, sum::Sum};
+use ovtigre_proto::id::JobId;
 use std::{
     collections::{BTreeMap, VecDeque},
     sync::Arc,
@@ -36,6 +37,8 @@ pub struct Merge {
     pub worker_micros: u64,
     /// Checkpoints taken.
     pub checkpoints: u32,
+    /// What is known of its allocations, where it has any.
+    pub decision: Option<Decision>,
     /// When it was needed last.
     pub used: Instant,
     pub(super) points: Vec<u32>,
@@ -82,6 +85,7 @@ impl Merge {
             prefixes,
             worker_micros: 0,
             checkpoints,
+            decision: None,
             used: Instant::now(),
             points,
             waiting: BTreeMap::new(),
@@ -166,7 +170,17 @@ impl Merge {
     pub(super) fn append(&mut self, row: &CommitRow, sum: &Sum) -> Result<()> {
         let Lane { replicate, region } = row.batch.lane();
         let prefix = &mut self.prefixes[region as usize][replicate as usize];
-        prefix.append(sum).map_err(|e| FarmError::Damaged(e.to_string()))?;
+        if self.decision.as_ref().is_some_and(|decision| decision.is_awaited_by(sum.batch)) {
+            let batch = sum.batch;
+            return Err(FarmError::Damaged(format!(
+                "how many samples each pixel has of {batch} is not known"
+            )));
+        }
+        let appended = match self.decision.as_ref().and_then(|decision| decision.of(sum.batch)) {
+            Some(allocation) => prefix.append_allocated(sum, allocation),
+            None => prefix.append(sum),
+        };
+        appended.map_err(|e| FarmError::Damaged(e.to_string()))?;
         self.worker_micros += row.worker_micros;
         Ok(())
     }
@@ -208,6 +222,11 @@ impl Merge {
                 hasher.update(&n.to_le_bytes());
             }
         }
+        if let Some(allocations) = self.decision.as_ref().and_then(|decision| decision.allocations.as_ref()) {
+            for half in &allocations.0 {
+                hasher.update(half.hash().as_bytes());
+            }
+        }
         Some(hasher.finalize().to_hex().to_string())
     }
 
@@ -246,6 +265,7 @@ impl Farm {
         Ok(held)
     }
 
+    /// A job's sums from their blobs.
     pub(super) async fn load(&self, live: &Live) -> Result<Merge> {
         let mut ledger = self.store.ledger(&live.id).await?;
         let mut kept = Vec::with_capacity(ledger.snapshots.len());
@@ -265,6 +285,8 @@ impl Farm {
         let schedule = Arc::clone(&live.schedule);
         let mut merge =
             Merge::new(schedule, live.spec.settings.planes(), kept, ledger.commits, ledger.checkpoints);
+        self.learn_allocations(live).await?;
+        merge.decision = live.decision();
         if live.mandate().is_some() {
             merge.look_again();
         }
@@ -444,35 +466,6 @@ impl Farm {
             FailPoint::PartialsBetween.pass();
         }
         Ok(())
-    }
-}
-
-/// A sum, decoded or not.
-enum Source {
-    Decoded(Sum),
-    Partial(Bytes),
-    Lost,
-}
-
-impl Source {
-    fn bytes(&self) -> u64 {
-        match self {
-            Self::Decoded(sum) => sum_bytes(sum),
-            Self::Partial(bytes) => bytes.len() as u64,
-            Self::Lost => 0,
-        }
-    }
-
-    /// The sum that was committed; `None` where what is kept is not that, or not whole.
-    fn decode(self, pixels: usize, row: &CommitRow) -> Option<Sum> {
-        match self {
-            Self::Decoded(sum) => Some(sum),
-            Self::Lost => None,
-            Self::Partial(bytes) => {
-                let (sum, _) = exr::read_partial(&bytes, pixels).ok()?;
-                (BlobId::of(sum.hash()) == row.hash).then_some(sum)
-            }
-        }
     }
 }
 

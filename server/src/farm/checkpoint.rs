@@ -10,6 +10,7 @@ use super::{
 use crate::{fail_point::FailPoint, store::row::NewCheckpoint};
 use ovtigre_core::{
     film::{
+        allocation::Allocations,
         certificate::Look,
         error::{ErrorEstimate, PlaneSummary, estimate, summarise},
     },
@@ -20,14 +21,16 @@ use ovtigre_proto::{
     status::JobState,
     telemetry::span::Place,
 };
+use std::sync::Arc;
 
 impl Farm {
     /// All lanes are at a checkpoint: its row of the curve is written down. Says how the job ends,
     /// where it ends here.
-    pub(super) async fn look(&self, live: &Live, held: Held) -> Result<(Held, Option<Ending>)> {
+    pub(super) async fn look(&self, live: &Arc<Live>, held: Held) -> Result<(Held, Option<Ending>)> {
         let mut span = self.traces.span("checkpoint", Place::OfJob(&live.id));
-        let (mut held, found) = measure(live, held).await?;
-        let row = self.take_row(live, &mut held, found).await?;
+        let (held, found) = measure(live, held).await?;
+        let (mut held, allocations) = decide(live, held).await?;
+        let row = self.take_row(live, &mut held, found, allocations).await?;
         span.add("ovtigre.samples", i64::from(row.samples));
         if let Some(error) = row.relative_error {
             span.add("ovtigre.relative_error", error);
@@ -65,11 +68,17 @@ impl Farm {
             return Ok(held);
         }
         let (mut held, found) = measure(live, held).await?;
-        self.take_row(live, &mut held, found).await?;
+        self.take_row(live, &mut held, found, None).await?;
         Ok(held)
     }
 
-    async fn take_row(&self, live: &Live, held: &mut Held, measured: Measured) -> Result<CurveRow> {
+    async fn take_row(
+        &self,
+        live: &Live,
+        held: &mut Held,
+        measured: Measured,
+        allocations: Option<Arc<Allocations>>,
+    ) -> Result<CurveRow> {
         let Measured { picture: found, layers } = measured;
         let merge = held.as_mut().expect("loaded by the caller");
         let progress = merge.progress();
@@ -91,13 +100,22 @@ impl Farm {
         let mandate = Self::mandate(live)?;
         FailPoint::CheckpointBeforeRow.pass();
         merge.checkpoints += 1;
-        let checkpoint =
-            NewCheckpoint { look: merge.checkpoints, row: row.clone(), layers: layers.clone(), progress };
+        let checkpoint = NewCheckpoint {
+            look: merge.checkpoints,
+            row: row.clone(),
+            layers: layers.clone(),
+            progress,
+            allocations: allocations.as_deref().cloned(),
+        };
         if let Err(error) = self.store.add_checkpoint(&live.id, mandate, checkpoint).await {
             merge.checkpoints -= 1;
             return Err(error.into());
         }
         FailPoint::CheckpointAfterRow.pass();
+        if let Some(allocations) = allocations {
+            live.set_allocations(allocations);
+            merge.decision = live.decision();
+        }
         live.set_view(|view| {
             if view.curve.len() < merge.checkpoints as usize {
                 view.curve.push(row.clone());
@@ -120,6 +138,16 @@ impl Merge {
     }
 }
 
+/// How samples are allocated from here on, where that is decided here.
+async fn decide(live: &Arc<Live>, held: Held) -> Result<(Held, Option<Arc<Allocations>>)> {
+    let live = Arc::clone(live);
+    blocking(move || {
+        let decided = held.as_ref().expect("loaded by the caller").decide(&live);
+        (held, decided)
+    })
+    .await
+}
+
 /// The errors of what is appended.
 struct Measured {
     picture: Option<ErrorEstimate>,
@@ -134,6 +162,8 @@ async fn measure(live: &Live, held: Held) -> Result<(Held, Measured)> {
     let narrow = narrow.map(|layer| layer + 1);
     blocking(move || {
         let merge = held.as_ref().expect("loaded by the caller");
+        // A pixel that has fewer samples than counted may have missed as much more.
+        let by_chance = by_chance.map(|brightest| brightest * merge.scarcity(region));
         let look = Look { number: merge.checkpoints + 1, by_chance };
         let found = estimate(region, &merge.prefixes, look);
         let found = found.filter(|e| e.rms.is_finite() && e.relative.is_finite());

@@ -4,15 +4,20 @@ use super::{
     Farm,
     append::blocking,
     error::{FarmError, Result},
-    reach::lost,
+    reach::{letters, lost},
     rules::Rules,
     spec::JobSpec,
     submit::resolve,
 };
 use ovtigre_core::{
+    bsdf::event::Letters,
     film::sketch::Sketch,
-    render::pilot::{Chance, NoPilot, Pilot, Plan, pilot},
-    settings::Method,
+    path::expression::language::Language,
+    render::{
+        inspect::{IMAGE_BASED, casts},
+        pilot::{Chance, NoPilot, Pilot, Plan, pilot},
+    },
+    settings::{Method, Settings, Shows},
 };
 use ovtigre_proto::{
     job::{JobRequest, MethodRequest},
@@ -20,9 +25,11 @@ use ovtigre_proto::{
     problem::Fault,
     scene::SceneContents,
 };
+use std::iter;
 
 /// What is chosen from beside `path`; of methods that are as good the first is taken.
-const OTHERS: [MethodRequest; 2] = [MethodRequest::Bidirectional, MethodRequest::Light];
+const OTHERS: [MethodRequest; 3] =
+    [MethodRequest::Bidirectional, MethodRequest::Caustics, MethodRequest::Light];
 
 /// What a request would become by each method that comes into question: at least one. Where it leaves the method open, these are
 /// the unbiased methods that can do all that is asked for, and of them those that leave out the fewest paths.
@@ -41,6 +48,9 @@ pub(super) fn candidates(
         return Ok(all);
     }
     for method in OTHERS {
+        if method == MethodRequest::Caustics && !casts(asked(&all[0].settings).intersection(letters(scene))) {
+            continue;
+        }
         let by = JobRequest { method: Some(method), ..request.clone() };
         if let Ok(spec) = resolve(by, scene, rules) {
             all.push(JobSpec { request: request.clone(), ..spec });
@@ -68,13 +78,18 @@ impl Farm {
         if candidates.len() == 1 {
             return Ok((candidates.remove(0), None));
         }
-        let tried = self.pilot(&candidates, scene).await?;
-        let method = tried.as_ref().map_or(candidates[0].settings.method, |(pilot, _)| pilot.method);
+        let plan = plan(&candidates, scene);
+        let untried = plan.untried();
+        let tried = self.pilot(&candidates[0], plan).await?;
+        let method = tried.as_ref().map_or(untried, |(pilot, _)| pilot.method);
         let mut spec = candidates.swap_remove(
             candidates.iter().position(|spec| spec.settings.method == method).expect("it was tried"),
         );
         spec.method_reason = match &tried {
             Ok((pilot, _)) => reason(pilot),
+            Err(why) if method == Method::Caustics => {
+                format!("it looks for light where others meet it by chance, and {why}")
+            }
             Err(why) => format!("nothing speaks against it, and {why}"),
         };
         let (pilot, sketch) = tried.ok().unzip();
@@ -85,23 +100,9 @@ impl Farm {
     /// Tries the candidates for one job, or says why not. Reads the scene whole, as an inspection does.
     async fn pilot(
         &self,
-        candidates: &[JobSpec],
-        scene: &SceneContents,
+        spec: &JobSpec,
+        plan: Plan,
     ) -> Result<std::result::Result<(Pilot, Sketch), NoPilot>> {
-        let spec = &candidates[0];
-        let plan = Plan {
-            settings: spec.settings.clone(),
-            region: spec.region,
-            samples: spec.samples_asked(),
-            error_target: spec.error_target,
-            seconds: spec.seconds,
-            triangles: scene.triangles_stored,
-            chance: match (spec.settings.method, spec.by_chance) {
-                (Method::Path, Some(_)) => Chance::Sometimes,
-                _ => Chance::Never,
-            },
-            methods: candidates.iter().map(|spec| spec.settings.method).collect(),
-        };
         if let Err(why) = plan.check() {
             return Ok(Err(why));
         }
@@ -113,6 +114,44 @@ impl Farm {
             Some(EnvironmentRequest::Uniform(_)) | None => None,
         };
         blocking(move || pilot(&bytes[..], environment.as_deref(), &plan)).await
+    }
+}
+
+/// Letters on the words of a picture and its layers.
+fn asked(settings: &Settings) -> Letters {
+    let layers = settings.layers.iter().filter_map(|layer| match &layer.shows {
+        Shows::Paths(paths) => Some(paths.as_str()),
+        Shows::Strategy(_) | Shows::Narrow => None,
+    });
+    let paths: Vec<&str> = iter::once(settings.paths.as_str()).chain(layers).collect();
+    Language::compile(&paths).map_or(Letters::NONE, |language| language.letters())
+}
+
+/// Whether the only light that has extent is a sky that is alike everywhere: rays meet it all the time.
+fn is_even(spec: &JobSpec, scene: &SceneContents) -> bool {
+    let sky = match &spec.request.environment {
+        Some(EnvironmentRequest::Uniform(_)) => true,
+        Some(EnvironmentRequest::Image(_)) => false,
+        None => !scene.needs.iter().any(|need| need == IMAGE_BASED),
+    };
+    sky && scene.lights.emissive_triangles == 0
+}
+
+/// What a pilot has to know of the candidates.
+fn plan(candidates: &[JobSpec], scene: &SceneContents) -> Plan {
+    let spec = &candidates[0];
+    Plan {
+        settings: spec.settings.clone(),
+        region: spec.region,
+        samples: spec.samples_asked(),
+        error_target: spec.error_target,
+        seconds: spec.seconds,
+        triangles: scene.triangles_stored,
+        chance: match (spec.settings.method, spec.by_chance) {
+            (Method::Path, Some(_)) if !is_even(spec, scene) => Chance::Sometimes,
+            _ => Chance::Never,
+        },
+        methods: candidates.iter().map(|spec| spec.settings.method).collect(),
     }
 }
 
@@ -171,7 +210,11 @@ mod tests {
         assert_eq!(methods(&of(&diffuse, |_| ())), [Method::Path, Method::Bidirectional, Method::Light]);
         // A mirror that is seen is on no light subpath that is joined to a pinhole.
         let mirror = scene(&["D", "S_M"], [2, 0]);
-        assert_eq!(methods(&of(&mirror, |_| ())), [Method::Path, Method::Bidirectional]);
+        assert_eq!(methods(&of(&mirror, |_| ())), [Method::Path, Method::Bidirectional, Method::Caustics]);
+        // Light comes to a glossy surface by next events, and what it makes of it to the lens.
+        let gloss = scene(&["D", "S"], [2, 0]);
+        let all = [Method::Path, Method::Bidirectional, Method::Caustics, Method::Light];
+        assert_eq!(methods(&of(&gloss, |_| ())), all);
         // What a mirror makes of a point's light is not met by any eye subpath.
         let point = scene(&["D", "S_M"], [0, 1]);
         let found = of(&point, |_| ());
@@ -197,6 +240,7 @@ mod tests {
             let method = match one.settings.method {
                 Method::Light => MethodRequest::Light,
                 Method::Bidirectional => MethodRequest::Bidirectional,
+                Method::Caustics => MethodRequest::Caustics,
                 _ => MethodRequest::Path,
             };
             let asked = of(&diffuse, |r| r.method = Some(method)).remove(0);
@@ -204,5 +248,17 @@ mod tests {
             assert_eq!(one.identity(&id), asked.identity(&id));
             assert_eq!((one.request.method, one.by_chance), (None, asked.by_chance));
         }
+    }
+
+    #[test]
+    fn an_even_sky_is_not_met_by_chance() {
+        let chance = |lamps: u32, change: fn(&mut JobRequest)| {
+            let scene = SceneContents { brightest: 1.0, ..scene(&["D", "S"], [lamps, 0]) };
+            plan(&of(&scene, change), &scene).chance
+        };
+        let sky = |r: &mut JobRequest| r.environment = Some(EnvironmentRequest::Uniform([1.0; 3]));
+        let image = |r: &mut JobRequest| r.environment = Some(EnvironmentRequest::Image(BlobId::of([1; 32])));
+        assert_eq!([chance(0, |_| ()), chance(0, sky)], [Chance::Never; 2]);
+        assert_eq!([chance(2, |_| ()), chance(2, sky), chance(0, image)], [Chance::Sometimes; 3]);
     }
 }

@@ -1,7 +1,7 @@
 //! A batch's sum is brought: checked, kept, counted once.
 
 use super::{
-    Farm,
+    Farm, allocation,
     append::blocking,
     audit::Audit,
     counters::Fate,
@@ -17,7 +17,7 @@ use crate::{
 };
 use bytes::Bytes;
 use ovtigre_core::{
-    film::{batch::Batch, exr, sum::Sum},
+    film::{allocation::Allocation, batch::Batch, exr, sum::Sum},
     settings::Method,
 };
 use ovtigre_proto::{
@@ -213,10 +213,17 @@ impl Farm {
     }
 
     async fn decode(&self, live: &Live, batch: Batch, partial: Bytes) -> Result<Decoded> {
+        if live.decision().is_some_and(|decision| decision.is_awaited_by(batch)) {
+            // Another server has decided, and handed it out.
+            self.learn_allocations(live).await?;
+        }
         let _turn = self.decoders.acquire().await.map_err(|_| FarmError::Stopping)?;
         let (job, scene) = (live.id.clone(), live.spec.fetched(&live.scene).clone());
         let method = live.spec.settings.method.name();
         let planes = live.spec.settings.planes() as usize;
+        let decision = live.decision();
+        let allocation = decision.as_ref().and_then(|decision| decision.of(batch)).map(Allocation::hash);
+        let counted = allocation::counted(live, batch);
         let decoded = blocking(move || {
             let read = exr::read_partial(&partial, batch.region.pixels());
             let (sum, says) = read.map_err(|e| FarmError::Sum(e.to_string()))?;
@@ -234,6 +241,15 @@ impl Farm {
             }
             if sum.planes.len() != planes {
                 return Err(FarmError::Sum(format!("it has {} planes, not {planes}", sum.planes.len())));
+            }
+            if says.allocation != allocation {
+                return Err(FarmError::Sum("its samples were not allocated as its lease says".to_owned()));
+            }
+            if sum.tile_rays.len() != counted {
+                let brings = sum.tile_rays.len();
+                return Err(FarmError::Sum(format!(
+                    "it counts the rays of {brings} tiles, not of {counted}"
+                )));
             }
             let hash = BlobId::of(sum.hash());
             Ok(Decoded { sum, hash, solution: says.solution })

@@ -171,10 +171,14 @@ impl Farm {
             let Some(row) = by_batch.get(&lane.at(block)) else { return Ok(None) };
             let name = BlobName::Partial(live.id.clone(), row.batch, row.hash.clone());
             let Ok(bytes) = self.blobs.get(&name).await else { return Ok(None) };
+            let decision = live.decision();
             let appended = blocking(move || {
                 let (sum, _) = exr::read_partial(&bytes, prefix.region().pixels()).ok()?;
-                prefix.append(&sum).ok()?;
-                Some(prefix)
+                let appended = match decision.as_ref().and_then(|decision| decision.of(sum.batch)) {
+                    Some(allocation) => prefix.append_allocated(&sum, allocation),
+                    None => prefix.append(&sum),
+                };
+                appended.ok().map(|()| prefix)
             });
             match appended.await? {
                 Some(appended) => prefix = appended,

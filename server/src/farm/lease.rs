@@ -203,7 +203,10 @@ impl Farm {
         let mut leases = Vec::new();
         let (mut begun, mut refused) = (Vec::new(), BTreeSet::new());
         for ((offer, id), claimed) in offers.into_iter().zip(ids).zip(claimed) {
-            let batch = self.live(&offer.job).and_then(|live| live.batch(offer.batch));
+            let live = self.live(&offer.job);
+            let batch = live.as_ref().and_then(|live| live.batch(offer.batch));
+            let decision = live.and_then(|live| live.decision());
+            let batch = batch.filter(|batch| !decision.as_ref().is_some_and(|d| d.is_awaited_by(*batch)));
             // Not claimed: the job was paused or ended meanwhile, or began elsewhere on other processors.
             let (true, Some(batch)) = (claimed, batch) else {
                 refused.insert(offer.job.clone());
@@ -224,6 +227,7 @@ impl Farm {
                 batch,
                 seconds,
                 upload,
+                allocation: decision.and_then(|decision| decision.of(batch).cloned()),
             });
             begun.push(job);
         }

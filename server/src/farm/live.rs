@@ -1,9 +1,9 @@
 //! A job that is not over, in memory.
 
-use super::{append::Merge, spec::JobSpec};
+use super::{allocation::Decision, append::Merge, spec::JobSpec};
 use crate::store::row::{BatchKey, CommitRow, JobRow, Mandate, Progress};
 use bytes::Bytes;
-use ovtigre_core::film::{schedule::Schedule, sum::Sum};
+use ovtigre_core::film::{allocation::Allocations, schedule::Schedule, sum::Sum};
 use ovtigre_proto::{
     curve::{CurveRow, LayerError},
     id::{BlobId, JobId},
@@ -89,6 +89,7 @@ pub struct Live {
     ending: Mutex<Option<Ending>>,
     made: Mutex<Option<Made>>,
     others: Mutex<Others>,
+    allocations: Mutex<Option<Arc<Allocations>>>,
 }
 
 /// What this server knows of the others' part in a job.
@@ -104,6 +105,8 @@ struct Others {
     version: u64,
     /// What the others were told.
     told: Option<Progress>,
+    /// Batches and checkpoints of what lists go by.
+    outlook: Option<(u64, usize)>,
 }
 
 impl Live {
@@ -123,7 +126,19 @@ impl Live {
             ending: Mutex::default(),
             made: Mutex::default(),
             others: Mutex::new(Others { version: row.version, ..Others::default() }),
+            allocations: Mutex::default(),
         }
+    }
+
+    /// What is known of its allocations; `None` where all pixels have the same number of samples.
+    pub fn decision(&self) -> Option<Decision> {
+        let after = self.spec.decided_after?;
+        Some(Decision { after, allocations: held(&self.allocations).clone() })
+    }
+
+    /// How its samples are allocated was decided.
+    pub fn set_allocations(&self, allocations: Arc<Allocations>) {
+        *held(&self.allocations) = Some(allocations);
     }
 
     /// A batch was brought.
@@ -221,6 +236,16 @@ impl Live {
     /// Whether `progress` is new to the other servers since the last call.
     pub fn note_told(&self, progress: Progress) -> bool {
         held(&self.others).told.replace(progress) != Some(progress)
+    }
+
+    /// Batches and checkpoints by which lists go, where this server has said how far it is.
+    pub fn outlook(&self) -> Option<(u64, usize)> {
+        held(&self.others).outlook
+    }
+
+    /// Lists go by so many batches and checkpoints.
+    pub fn set_outlook(&self, stage: (u64, usize)) {
+        held(&self.others).outlook = Some(stage);
     }
 
     /// The batch at `key`, where the schedule has it.

@@ -95,6 +95,8 @@ impl Farm {
             None => *held = Some(self.load(live).await?),
             Some(merge) => {
                 let ledger = self.store.ledger(&live.id).await?;
+                self.learn_allocations(live).await?;
+                merge.decision = live.decision();
                 merge.follow(ledger.commits, ledger.checkpoints);
             }
         }

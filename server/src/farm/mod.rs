@@ -1,5 +1,6 @@
 //! Rules, no HTTP: submit, split, lease, commit, append, checkpoint, stop, reap.
 
+pub mod allocation;
 pub mod append;
 pub mod audit;
 pub mod book;
@@ -22,8 +23,10 @@ pub mod live;
 pub mod mandates;
 pub mod needs;
 pub mod notices;
+mod numbers;
 pub mod open;
 pub mod others;
+mod outlook;
 pub mod parts;
 pub mod paths;
 pub mod picture;
@@ -34,6 +37,7 @@ pub mod rules;
 pub mod scene;
 mod sketches;
 pub mod solution;
+mod source;
 pub mod space;
 pub mod spec;
 pub mod split;

@@ -101,6 +101,7 @@ impl Farm {
         let curve = self.store.curve(&row.id).await?;
         let layers = self.store.layers(&row.id).await?;
         let live = Arc::new(Live::new(row, spec, curve, layers));
+        self.learn_allocations(&live).await?;
         match held(&self.lives).entry(row.id.clone()) {
             Entry::Occupied(_) => return Ok(()),
             Entry::Vacant(place) => place.insert(Arc::clone(&live)),
@@ -121,6 +122,7 @@ impl Farm {
         }
         let schedule = Arc::clone(&live.schedule);
         let plan = Plan::new(schedule, ledger.cursors, ledger.returned, ledger.checkpoints);
+        let plan = plan.gated(live.spec.decided_after);
         let hand_out = if row.state == JobState::Paused { HandOut::Paused } else { HandOut::Yes };
         let settings = live.spec.settings.clone();
         let wants = live.spec.wants(row.class.clone());

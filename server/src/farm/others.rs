@@ -96,6 +96,7 @@ impl Farm {
         }
         let view = live.view();
         if view.curve.len() < head.looks as usize || view.progress.batches < head.progress.batches {
+            self.learn_allocations(live).await?;
             self.book().reach(&live.id, head.looks);
             let curve = self.store.curve(&live.id).await?;
             let layers = self.store.layers(&live.id).await?;

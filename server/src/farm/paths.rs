@@ -23,8 +23,8 @@ const NARROW: &str = "narrow";
 /// Vertices of either subpath of a technique.
 const VERTICES_MAX: u32 = 255;
 /// Methods that this version renders by.
-const RENDERED: [Method; 5] =
-    [Method::Path, Method::Light, Method::Bidirectional, Method::Photon, Method::Radiosity];
+const RENDERED: [Method; 6] =
+    [Method::Path, Method::Light, Method::Bidirectional, Method::Caustics, Method::Photon, Method::Radiosity];
 /// What method `radiosity` solves.
 const DIFFUSE: &str = "LD*E";
 
@@ -97,6 +97,7 @@ fn method(request: &JobRequest, note: &mut impl FnMut(&str, String)) -> Method {
         None | Some(MethodRequest::Auto | MethodRequest::Path) => Method::Path,
         Some(MethodRequest::Light) => Method::Light,
         Some(MethodRequest::Bidirectional) => Method::Bidirectional,
+        Some(MethodRequest::Caustics) => Method::Caustics,
         Some(MethodRequest::Photon) => Method::Photon,
         Some(MethodRequest::Radiosity) => Method::Radiosity,
     };

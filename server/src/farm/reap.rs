@@ -99,7 +99,8 @@ impl Farm {
 
     async fn keep_and_tell(&self) -> Result<()> {
         self.keep_mandates().await?;
-        self.tell_others().await
+        self.tell_others().await?;
+        self.tell_outlooks().await
     }
 
     /// Appends what comes until the job is over.

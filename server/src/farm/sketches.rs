@@ -34,8 +34,8 @@ impl Sketches {
 }
 
 impl Farm {
-    /// A job's picture by its pilot as PNG, as large as the job's own will be, and the size in which it was made. There is none of
-    /// its errors and of its layers, and where no pilot ran, where another server took the job, or long ago.
+    /// A job's picture by its pilot as PNG, as large as the job's own will be when it is developed so, and the size in which it was
+    /// made. There is none of its errors and of its layers, and where no pilot ran, where another server took the job, or long ago.
     pub async fn sketch(
         &self,
         id: &JobId,
@@ -47,9 +47,10 @@ impl Farm {
             return Ok(None);
         };
         let region = live.spec.region;
-        let to = Size { width: region.width, height: region.height };
-        let size = sketch.size();
-        let bytes = blocking(move || png(region, &sketch.enlarged(to), &develop)).await?;
+        // At once to the size that is asked for: a small picture of a large one costs no more than that.
+        let to = develop.size(Size { width: region.width, height: region.height });
+        let (size, frame) = (sketch.size(), to.frame());
+        let bytes = blocking(move || png(frame, &sketch.resized(to), &develop)).await?;
         Ok(Some((size, bytes.into())))
     }
 }
@@ -67,6 +68,6 @@ mod tests {
         }
         assert_eq!(held(&sketches.0).len(), SKETCHES_MAX);
         assert!(sketches.of(&id(2)).is_none());
-        assert_eq!(sketches.of(&id(3)).unwrap().enlarged(Size { width: 1, height: 1 }), [[3.0; 3]]);
+        assert_eq!(sketches.of(&id(3)).unwrap().resized(Size { width: 1, height: 1 }), [[3.0; 3]]);
     }
 }

@@ -8,7 +8,7 @@ use ovtigre_core::{
     },
     path::reach::Unreachable,
     render::pilot::Pilot,
-    settings::{CameraChoice, FULL, Gloss, Method, Settings, Shadows, Shutter, Weights},
+    settings::{CameraChoice, Distribution, FULL, Gloss, Method, Settings, Shadows, Shutter, Weights},
 };
 use ovtigre_proto::{id::BlobId, job::JobRequest, needs::Needs, pair::EnvironmentRequest};
 use serde::{Deserialize, Deserializer, Serialize, de::Error as _};
@@ -37,6 +37,9 @@ pub struct JobSpec {
     /// The id of the token that sent it.
     #[serde(default)]
     pub owner: Option<String>,
+    /// Number of blocks after which samples are allocated; `None` where all pixels have the same number of them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub decided_after: Option<u32>,
     /// The brightest that a sample can be which meets a light by chance only.
     #[serde(default)]
     pub by_chance: Option<f64>,
@@ -145,6 +148,7 @@ fn before() -> Settings {
         shadows: Shadows::On,
         seed: 0,
         replicates: 1,
+        sampling: Distribution::Uniform,
     }
 }
 

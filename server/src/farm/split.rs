@@ -19,6 +19,8 @@ pub struct Plan {
     /// The next block of each lane that has one.
     next: BTreeSet<BatchKey>,
     returned: BTreeSet<BatchKey>,
+    /// Blocks from this one on are handed out only once the checkpoint before it was reached.
+    gate: Option<u32>,
 }
 
 impl Plan {
@@ -38,8 +40,15 @@ impl Plan {
             reached: reached as usize,
             next: next.collect(),
             returned: returned.into_iter().collect(),
+            gate: None,
             schedule,
         }
+    }
+
+    /// The same, of which no batch after `blocks` blocks is handed out before their checkpoint was reached.
+    #[must_use]
+    pub fn gated(self, blocks: Option<u32>) -> Self {
+        Self { gate: blocks, ..self }
     }
 
     /// A plan of which nothing was handed out.
@@ -58,7 +67,8 @@ impl Plan {
     pub fn take(&mut self, ahead: u64, shun: impl Fn(BatchKey) -> bool) -> Option<BatchKey> {
         let returned = self.returned.iter().find(|batch| !shun(**batch));
         let batch = [returned, self.next.first()].into_iter().flatten().min().copied()?;
-        if batch.block >= self.limit() && self.past_limit() >= ahead {
+        let shut = self.gate.is_some_and(|gate| batch.block >= gate && self.limit() <= gate);
+        if shut || batch.block >= self.limit() && self.past_limit() >= ahead {
             return None;
         }
         if !self.returned.remove(&batch) {
@@ -76,7 +86,8 @@ impl Plan {
         cursors: impl IntoIterator<Item = (Lane, u32)>,
         returned: impl IntoIterator<Item = BatchKey>,
     ) {
-        *self = Self::new(Arc::clone(&self.schedule), cursors, returned, self.reached as u32);
+        let (schedule, gate) = (Arc::clone(&self.schedule), self.gate);
+        *self = Self::new(schedule, cursors, returned, self.reached as u32).gated(gate);
     }
 
     /// A batch that was handed out comes back.
@@ -169,6 +180,19 @@ mod tests {
         assert_eq!(count(&mut plan, 4), 1);
         plan.reach(1);
         assert_eq!(count(&mut plan, 4), 3, "four are past the second checkpoint, of which one was before");
+    }
+
+    #[test]
+    fn a_gate_is_shut_until_its_checkpoint_was_reached() {
+        // Checkpoints are after 1, 2, 3, 4 … blocks.
+        let mut plan = plan(100).gated(Some(2));
+        let count = |plan: &mut Plan| std::iter::from_fn(|| plan.take(u64::MAX, |_| false)).count();
+        assert_eq!(count(&mut plan), 6);
+        plan.reach(1);
+        plan.refresh([0, 1, 2].map(|replicate| (Lane { replicate, region: 0 }, 2)), []);
+        assert_eq!(count(&mut plan), 0);
+        plan.reach(2);
+        assert_eq!(count(&mut plan) as u64, plan.schedule().batches() - 6);
     }
 
     #[test]

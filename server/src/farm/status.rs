@@ -11,7 +11,10 @@ use crate::store::{
     list::{JobFilter, Place, Standing},
     row::{JobRow, Progress, WorkerRow},
 };
-use ovtigre_core::{path::expression::presets::shown, radiosity::report::RadiosityReport, settings::Layer};
+use ovtigre_core::{
+    film::allocation::Allocations, path::expression::presets::shown, radiosity::report::RadiosityReport,
+    settings::Layer,
+};
 use ovtigre_proto::{
     curve::{CurveRow, LayerError},
     id::{JobId, WorkerId},
@@ -33,11 +36,13 @@ struct Known {
     workers: u32,
     /// How its scene was solved.
     radiosity: Option<RadiosityReport>,
+    /// How its samples are allocated.
+    allocations: Option<Allocations>,
 }
 
 impl From<Standing> for Known {
     fn from(Standing { latest, layers, workers }: Standing) -> Self {
-        Self { curve: latest.into_iter().collect(), layers, workers, radiosity: None }
+        Self { curve: latest.into_iter().collect(), layers, workers, radiosity: None, allocations: None }
     }
 }
 
@@ -81,13 +86,16 @@ impl Farm {
         let spec = read_spec(row)?;
         let mut known = self.known(row, &spec).await?;
         known.radiosity = self.solution_of(&row.id, spec.settings.method).await?;
+        if spec.decided_after.is_some() {
+            known.allocations = self.store.allocations(&row.id).await?;
+        }
         Ok(self.described(row, spec, known))
     }
 
     /// What this server has in memory of a job that `workers` work at.
     fn seen(&self, id: &JobId, workers: u32) -> Option<Known> {
         let view = self.live(id)?.view();
-        Some(Known { curve: view.curve, layers: view.layers, workers, radiosity: None })
+        Some(Known { curve: view.curve, layers: view.layers, workers, radiosity: None, allocations: None })
     }
 
     async fn known(&self, row: &JobRow, spec: &JobSpec) -> Result<Known> {
@@ -98,12 +106,13 @@ impl Farm {
         let curve = self.store.curve(&row.id).await?;
         let plain = spec.settings.layers.is_empty();
         let layers = if plain { Vec::new() } else { self.store.layers(&row.id).await? };
-        Ok(Known { curve, layers, workers, radiosity: None })
+        Ok(Known { curve, layers, workers, radiosity: None, allocations: None })
     }
 
     fn described(&self, row: &JobRow, spec: JobSpec, known: Known) -> JobStatus {
         let progress = self.progress(row);
-        let eta_seconds = eta(row, &progress, &spec, &known.curve);
+        let running = (row.state == JobState::Running).then_some(row.run_seconds);
+        let eta_seconds = running.and_then(|seconds| eta(seconds, &progress, &spec, &known.curve));
         let batches_asked = spec.schedule().batches();
         let layers = layers_of(&spec.settings.layers, &known.layers);
         JobStatus {
@@ -138,6 +147,7 @@ impl Farm {
             unreachable: spec.unreachable,
             needs: spec.needs,
             radiosity: known.radiosity,
+            allocations: known.allocations,
             layers,
             settings: spec.settings,
             region: spec.region,
@@ -223,15 +233,12 @@ fn worker_status(row: WorkerRow) -> WorkerStatus {
     }
 }
 
-/// Seconds until the first of: all samples drawn, the time over, the error reached.
-fn eta(row: &JobRow, progress: &Progress, spec: &JobSpec, curve: &[CurveRow]) -> Option<f64> {
-    if row.state != JobState::Running {
-        return None;
-    }
+/// Seconds until the first of: all samples drawn, the time over, the error reached; of a job that has run for `run_seconds`.
+pub(super) fn eta(run_seconds: f64, progress: &Progress, spec: &JobSpec, curve: &[CurveRow]) -> Option<f64> {
     let asked = f64::from(spec.samples_asked());
     let by_samples = (progress.samples > 0.0)
-        .then(|| row.run_seconds * (asked - progress.samples).max(0.0) / progress.samples);
-    let by_time = spec.seconds.map(|seconds| seconds - row.run_seconds);
-    let by_error = target_at(curve, spec).map(|at| at - row.run_seconds);
+        .then(|| run_seconds * (asked - progress.samples).max(0.0) / progress.samples);
+    let by_time = spec.seconds.map(|seconds| seconds - run_seconds);
+    let by_error = target_at(curve, spec).map(|at| at - run_seconds);
     [by_samples, by_time, by_error].into_iter().flatten().map(|t| t.max(0.0)).min_by(f64::total_cmp)
 }

@@ -5,6 +5,7 @@ use super::{
     append::{Held, Merge},
     error::{FarmError, Result},
     live::{Ending, Live, Made, Waits},
+    outlook::part,
 };
 use crate::{
     blobs::{BlobFolder, BlobName},
@@ -39,7 +40,8 @@ impl Farm {
             _ => self.drop_sums(live).await?,
         }
         FailPoint::EndAfterSums.pass();
-        let settlement = Settlement { mandate, progress, manifest, certified: ending.certified };
+        let part = part(&live.spec, &progress, ending.state);
+        let settlement = Settlement { mandate, progress, part, manifest, certified: ending.certified };
         let change = |row: &JobRow| {
             let over = row.state.is_over();
             Some(JobChange {
@@ -67,8 +69,9 @@ impl Farm {
     pub(super) async fn settle_without_picture(&self, live: &Live, reason: String) -> Result<()> {
         self.book().remove(&live.id);
         let progress = live.view().progress;
+        let part = part(&live.spec, &progress, JobState::Failed);
         let settlement =
-            Settlement { mandate: Self::mandate(live)?, progress, manifest: None, certified: false };
+            Settlement { mandate: Self::mandate(live)?, progress, part, manifest: None, certified: false };
         let change = |row: &JobRow| {
             let over = row.state.is_over();
             Some(JobChange {

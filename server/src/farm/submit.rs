@@ -1,11 +1,12 @@
 //! A request becomes a job: checked, every default resolved.
 
 use super::{
-    Farm,
+    Farm, allocation,
     choice::candidates,
     error::{FarmError, Result, fault},
     light_groups::{expanded, unknown},
     needs::needs,
+    numbers::numbers,
     paths::choose,
     reach::{letters, line, missing},
     rules::{PARTIAL_BYTES_MAX, Rules},
@@ -44,7 +45,7 @@ use std::{sync::Arc, time::SystemTime};
 /// Samples a pixel of a job, at most.
 pub(super) const SAMPLES_MAX: u32 = 1 << 22;
 /// Replicates of a job, at most.
-const REPLICATES_MAX: u32 = 256;
+pub(super) const REPLICATES_MAX: u32 = 256;
 /// Longest name.
 const NAME_MAX: usize = 200;
 /// Largest weight.
@@ -246,6 +247,7 @@ pub fn resolve(
     let samples = request.samples.unwrap_or(SAMPLES_DEFAULT);
     let replicates = request.replicates.unwrap_or(REPLICATES_DEFAULT.min(samples));
     shares(&request, samples, replicates, &mut note);
+    let sampling = allocation::wished(&request, chosen.method, replicates, &mut note);
     let lens = lens(&request).unwrap_or_else(|(pointer, detail)| {
         note(pointer, detail);
         None
@@ -260,8 +262,7 @@ pub fn resolve(
         .map(|language| missing(&language, chosen.method, &request, scene, camera, lens))
         .unwrap_or_default();
     let mut warnings = warnings(scene, lit, camera, samples, replicates);
-    warnings.extend(unnamed);
-    warnings.extend(unreachable.iter().map(line));
+    warnings.extend(unnamed.into_iter().chain(unreachable.iter().map(line)));
     let mut spec = JobSpec {
         settings: Settings {
             size,
@@ -280,6 +281,7 @@ pub fn resolve(
             shadows: request.shadows.unwrap_or_default(),
             seed: request.seed.unwrap_or(0),
             replicates,
+            sampling,
         },
         region,
         samples: samples / replicates,
@@ -287,6 +289,7 @@ pub fn resolve(
         seconds: request.seconds,
         build: rules.build.to_owned(),
         owner: None,
+        decided_after: None,
         by_chance: by_chance(chosen.method, letters(scene), scene.brightest),
         needs: Needs::default(),
         fetched: None,
@@ -297,46 +300,8 @@ pub fn resolve(
         request,
     };
     spec.needs = needs(scene, &spec.settings, words);
+    allocation::resolve(&mut spec);
     fits(&spec, rules).map(|()| spec)
-}
-
-fn numbers(request: &JobRequest, note: &mut impl FnMut(&str, String)) {
-    let positive = |x: f64| x.is_finite() && x > 0.0;
-    if request.samples.is_some_and(|n| n == 0 || n > SAMPLES_MAX) {
-        note("/samples", format!("samples are 1 to {SAMPLES_MAX}"));
-    }
-    if request.replicates.is_some_and(|n| n == 0 || n > REPLICATES_MAX) {
-        note("/replicates", format!("replicates are 1 to {REPLICATES_MAX}"));
-    }
-    if request.error.is_some_and(|e| !positive(e)) {
-        note("/error", "the relative error to stop at is positive, such as 0.01".to_owned());
-    }
-    if request.seconds.is_some_and(|s| !positive(s)) {
-        note("/seconds", "the run time to stop after is positive".to_owned());
-    }
-    if request.environment_rotation.is_some_and(|d| !d.is_finite()) {
-        note("/environment_rotation", "the rotation is a finite number of degrees".to_owned());
-    }
-    if request.environment_rotation.is_some_and(|d| d != 0.0) && request.environment.is_none() {
-        note("/environment_rotation", "there is no 'environment' to rotate".to_owned());
-    }
-    if let Some(EnvironmentRequest::Uniform(rgb)) = &request.environment
-        && !rgb.iter().all(|c| c.is_finite() && *c >= 0.0)
-    {
-        note("/environment", "a radiance has three finite numbers that are not negative".to_owned());
-    }
-    if let Some([open, close]) = request.shutter
-        && !(open.is_finite() && close.is_finite() && open <= close)
-    {
-        note(
-            "/shutter",
-            "the shutter opens and closes at finite seconds, and not before it opens".to_owned(),
-        );
-    }
-    if let Some(fault) = request.name.as_ref().and_then(|name| bad_text(name)) {
-        note("/name", fault);
-    }
-    sharing(request, note);
 }
 
 /// What is wrong with a text for people.
@@ -345,23 +310,6 @@ pub(super) fn bad_text(text: &str) -> Option<String> {
         return Some(format!("a name has 1 to {NAME_MAX} bytes"));
     }
     text.chars().any(char::is_control).then(|| "a name has no control characters".to_owned())
-}
-
-fn sharing(request: &JobRequest, note: &mut impl FnMut(&str, String)) {
-    if request.weight.is_some_and(|n| n == 0 || n > WEIGHT_MAX) {
-        note("/weight", format!("a weight is 1 to {WEIGHT_MAX}"));
-    }
-    if request.max_workers == Some(0) {
-        note("/max_workers", "a job needs 1 worker or more: pause it instead".to_owned());
-    }
-    if request.tags.len() > TAGS_MAX {
-        note("/tags", format!("there are more than {TAGS_MAX} tags"));
-    }
-    for (i, tag) in request.tags.iter().enumerate() {
-        if let Some(fault) = bad_text(tag) {
-            note(&format!("/tags/{i}"), fault);
-        }
-    }
 }
 
 /// A camera by its name, else by its number; the first, else one that frames the scene.

@@ -63,6 +63,17 @@ function signIn() {
 
 function signed() {
   text(sign, token() ? 'Sign out' : 'Sign in');
+  learn();
+}
+
+/** What the token may do: all else is hidden by the style sheet, and refused by the farm. */
+async function learn() {
+  const { dataset } = document.documentElement;
+  const asked = token();
+  const role = await get('/v1/caller').then((caller) => caller.role, () => null);
+  if (token() !== asked) return;
+  if (role) dataset.role = role;
+  else delete dataset.role;
 }
 
 sign.addEventListener('click', () => {

@@ -5,6 +5,9 @@ const KEY = 'ovtigre.token';
 /** The token, where the user has signed in. */
 export const token = () => sessionStorage.getItem(KEY);
 
+/** Whether the token may do what takes one of role `submit`, as far as the farm has said. */
+export const maySubmit = () => !['read', 'work'].includes(document.documentElement.dataset.role);
+
 /** Keeps or forgets the token. */
 export function keepToken(value) {
   if (value) sessionStorage.setItem(KEY, value);

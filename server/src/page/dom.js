@@ -31,6 +31,9 @@ export function svg(name, attributes = {}, ...children) {
   return put(set(document.createElementNS(SVG, name), attributes), children);
 }
 
+/** What is said in the place of what takes a token of another role. */
+export const refused = (role, what) => el('p', { class: 'refused', 'data-of': role }, `This token may not ${what}: that takes one of role ${role}.`);
+
 /** Replaces all that is in a node. */
 export function fill(node, ...children) {
   node.replaceChildren();

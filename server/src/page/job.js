@@ -1,7 +1,7 @@
 // A job: its picture, how good it is and will be, who works at it, what was left out, and what can be done with it.
 
 import { events, get, save, send, token } from './client.js';
-import { asked, confirmed, el, fill, notice, pause, renew, repeat, text } from './dom.js';
+import { asked, confirmed, el, fill, notice, pause, refused, renew, repeat, text } from './dom.js';
 import { count, digits, errorOf, part, percent, samples, seconds, short, when } from './format.js';
 import { badge } from './jobs.js';
 import { plot, table } from './plot.js';
@@ -19,7 +19,7 @@ class JobView {
     this.viewer = new Viewer(job, signal);
     this.title = el('h1');
     this.state = el('span');
-    this.actions = el('div', { class: 'row wrap actions', role: 'group', 'aria-label': 'Change this job' });
+    this.actions = el('div', { class: 'row wrap actions', role: 'group', 'aria-label': 'Change this job', 'data-needs': 'submit' });
     this.reason = el('p', { class: 'reason', role: 'status' });
     this.bar = el('progress', { max: 1, 'aria-label': 'Samples drawn' });
     this.facts = el('dl', { class: 'facts' });
@@ -38,7 +38,7 @@ class JobView {
     } }, title);
     root.append(
       el('nav', { class: 'crumbs', 'aria-label': 'Where you are' }, el('a', { href: '#/jobs' }, 'Jobs'), ' / ', el('span', { class: 'mono' }, job.id)),
-      el('div', { class: 'head' }, el('div', { class: 'row' }, this.title, this.state), this.actions),
+      el('div', { class: 'head' }, el('div', { class: 'row' }, this.title, this.state), this.actions, refused('submit', 'change jobs')),
       this.reason, this.numbers, this.bar,
       el('div', { class: 'split' },
         el('div', { class: 'column' }, this.viewer.node,
@@ -159,7 +159,10 @@ class JobView {
         layer.error?.estimated_bias != null ? el('span', { class: 'under' }, `bias about ${percent(layer.error.estimated_bias)}`) : null]]),
       job.request.bounces != null ? ['Bounces', job.request.bounces] : null,
       job.request.lens_radius ? ['Lens', `radius ${job.request.lens_radius} m, in focus at ${job.request.focus_distance} m`] : null,
+      job.request.environment ? ['Environment', [Array.isArray(job.request.environment) ? job.request.environment.join(', ') : el('span', { class: 'mono', title: job.request.environment }, `${job.request.environment.slice(0, 12)}…`),
+        job.request.environment_rotation ? el('span', { class: 'under' }, `turned by ${digits(job.request.environment_rotation)}°`) : null]] : null,
       job.request.shutter ? ['Shutter', `${job.request.shutter.join(' to ')} s`] : null,
+      settings.sampling === 'adaptive' ? ['Samples go', ['where the error is', job.allocations ? null : el('span', { class: 'under' }, 'everywhere alike until that is known')]] : null,
       ['Seed', settings.seed],
       ['Stops at', [`${samples(job.samples_asked)} samples`, job.error_target ? `error ${percent(job.error_target)}` : null, job.request.seconds ? seconds(job.request.seconds) : null].filter(Boolean).join(', or ')],
       ['Processor class', job.class ?? '–'],

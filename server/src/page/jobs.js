@@ -1,7 +1,7 @@
 // The list of jobs: filtered, sorted, paged, live, and changed many at a time.
 
 import { Problem, Watched, send } from './client.js';
-import { confirmed, el, fill, notice, repeat, rested, text } from './dom.js';
+import { confirmed, el, fill, notice, refused, repeat, rested, text } from './dom.js';
 import { count, errorOf, part, percent, samples, seconds, since, when } from './format.js';
 
 const STATES = ['', 'running', 'queued', 'paused', 'done', 'failed', 'cancelled'];
@@ -9,19 +9,17 @@ const PACE = 2000;
 /** What is chosen stays while the page is open. */
 const view = { state: '', text: '', limit: 50, cursors: [], sort: null, down: false };
 
+/** What is shown of each job, and what the farm sorts all of them by. */
 const COLUMNS = [
-  { key: 'name', title: 'Job', by: (job) => job.name.toLowerCase() },
-  { key: 'state', title: 'State', by: (job) => STATES.indexOf(job.state) },
-  { key: 'progress', title: 'Progress', by: part },
-  { key: 'error', title: 'Error', by: (job) => job.error?.relative_error ?? Infinity },
-  { key: 'eta', title: 'Time', by: (job) => job.eta_seconds ?? Infinity },
-  { key: 'workers', title: 'Workers', by: (job) => job.workers },
-  { key: 'priority', title: 'Priority', by: (job) => job.priority },
-  { key: 'created', title: 'Came', by: (job) => Date.parse(job.created_at) },
+  { key: 'name', title: 'Job' },
+  { key: 'state', title: 'State' },
+  { key: 'progress', title: 'Progress' },
+  { key: 'error', title: 'Error' },
+  { key: 'eta', title: 'Time' },
+  { key: 'workers', title: 'Workers' },
+  { key: 'priority', title: 'Priority' },
+  { key: 'created', title: 'Came' },
 ];
-
-/** What the farm sorts the whole list by; by all else the jobs of one page are sorted. */
-const WHOLE = ['name', 'state', 'priority', 'created'];
 
 /** A state as a word with a mark of its own, so that colour is not needed to tell it. */
 export function badge(state) {
@@ -95,7 +93,7 @@ class Thumbnail {
 class Row {
   constructor(job, signal, chosen) {
     this.thumbnail = new Thumbnail(signal);
-    this.box = el('input', { type: 'checkbox', 'aria-label': `Choose ${job.name}`, onchange: chosen });
+    this.box = el('input', { type: 'checkbox', 'data-needs': 'submit', 'aria-label': `Choose ${job.name}`, onchange: chosen });
     this.name = el('a', { href: `#/job/${job.id}` });
     this.under = el('span', { class: 'under' });
     this.state = el('td', { class: 'c-state' });
@@ -152,7 +150,7 @@ export async function show(root, { signal }) {
   const body = el('tbody');
   const bulk = el('div', { class: 'bulk', hidden: true, role: 'group', 'aria-label': 'Change the chosen jobs' });
   const picked = () => [...rows.values()].filter((row) => row.box.checked);
-  const all = el('input', { type: 'checkbox', 'aria-label': 'Choose all shown', onchange: () => {
+  const all = el('input', { type: 'checkbox', 'data-needs': 'submit', 'aria-label': 'Choose all shown', onchange: () => {
     for (const row of rows.values()) row.box.checked = all.checked;
     choose();
   } });
@@ -183,11 +181,11 @@ export async function show(root, { signal }) {
     [25, 50, 100, 250].map((n) => el('option', { value: n, selected: n === view.limit }, `${n} a page`)));
 
   root.append(
-    el('div', { class: 'head' }, el('h1', {}, 'Jobs'), el('a', { class: 'button primary', href: '#/new' }, 'New job')),
+    el('div', { class: 'head' }, el('h1', {}, 'Jobs'), el('a', { class: 'button primary', href: '#/new', 'data-needs': 'submit' }, 'New job')),
     el('div', { class: 'tools' }, el('div', { class: 'switch', role: 'group', 'aria-label': 'Jobs in the state' }, filters), search, limit),
     bulk,
     el('div', { class: 'panel flush' },
-      el('table', { class: 'jobs-table' }, el('caption', { class: 'sr' }, 'Jobs, the newest first'), el('thead', {}, el('tr', {}, el('th', { scope: 'col', class: 'c-box' }, all), heads)), body),
+      el('table', { class: 'jobs-table' }, el('caption', { class: 'sr' }, 'Jobs, the newest first'), el('thead', {}, el('tr', {}, el('td', { class: 'c-box' }, all), heads)), body),
       empty),
     el('div', { class: 'pages' }, where, el('div', { class: 'row' }, newer, older)));
 
@@ -224,16 +222,7 @@ export async function show(root, { signal }) {
 
   function arrange() {
     COLUMNS.forEach((column, i) => heads[i].setAttribute('aria-sort', view.sort !== column.key ? 'none' : view.down ? 'descending' : 'ascending'));
-    const column = COLUMNS.find(({ key }) => key === view.sort && !WHOLE.includes(key));
-    const sorted = [...items];
-    if (column) {
-      const sign = view.down ? -1 : 1;
-      sorted.sort((a, b) => {
-        const [x, y] = [column.by(a), column.by(b)];
-        return x < y ? -sign : x > y ? sign : 0;
-      });
-    }
-    sorted.forEach((job, i) => {
+    items.forEach((job, i) => {
       const { node } = rows.get(job.id);
       if (body.children[i] !== node) body.insertBefore(node, body.children[i] ?? null);
     });
@@ -258,10 +247,10 @@ export async function show(root, { signal }) {
     empty.hidden = items.length > 0;
     if (items.length === 0) {
       fill(empty, el('p', {}, filtered ? 'No job is like that.' : 'There is no job yet.'),
-        filtered ? null : el('p', {}, el('a', { class: 'button primary', href: '#/new' }, 'Render a scene')));
+        filtered ? null : [el('p', { 'data-needs': 'submit' }, el('a', { class: 'button primary', href: '#/new' }, 'Render a scene')), refused('submit', 'render scenes')]);
     }
     const from = view.cursors.length * view.limit;
-    text(where, items.length > 0 ? `${count(from + 1)}–${count(from + items.length)}${WHOLE.includes(view.sort) ? '' : `, the newest first${view.sort ? '; sorted on this page' : ''}`}` : '');
+    text(where, items.length > 0 ? `${count(from + 1)}–${count(from + items.length)}${view.sort ? '' : ', the newest first'}` : '');
     older.disabled = !next;
     newer.disabled = view.cursors.length === 0;
     if (!performance.getEntriesByName('ovtigre-ready').length) performance.mark('ovtigre-ready');
@@ -272,7 +261,7 @@ export async function show(root, { signal }) {
     const query = new URLSearchParams({ limit: view.limit });
     if (view.state) query.set('state', view.state);
     if (view.text) query.set('text', view.text);
-    if (WHOLE.includes(view.sort)) query.set('sort', `${view.down ? '-' : ''}${view.sort}`);
+    if (view.sort) query.set('sort', `${view.down ? '-' : ''}${view.sort}`);
     if (view.cursors.length) query.set('cursor', view.cursors.at(-1));
     const mine = turning;
     try {

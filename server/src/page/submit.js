@@ -1,7 +1,7 @@
 // A new job: a scene is dropped, looked into and previewed; what is wished is checked while it is written.
 
-import { Problem, get, send, upload } from './client.js';
-import { el, fill, notice, pause, rested, text } from './dom.js';
+import { Problem, get, maySubmit, send, upload } from './client.js';
+import { el, fill, notice, pause, refused, rested, text } from './dom.js';
 import { chosen, dropped, packed } from './files.js';
 import { bytes, count, samples } from './format.js';
 import { hashOf } from './blake3.js';
@@ -15,7 +15,7 @@ const PRESETS = [
 ];
 const METHODS = [
   ['auto', 'chosen by the farm'], ['path', 'paths from the eye'], ['bidirectional', 'from both ends, joined'],
-  ['light', 'paths from the lights'], ['photon', 'photon map'], ['radiosity', 'finite elements'],
+  ['caustics', 'from the eye, caustics from the lights'], ['light', 'paths from the lights'], ['photon', 'photon map'], ['radiosity', 'finite elements'],
 ];
 const PREVIEW = { width: 320, samples: 16 };
 
@@ -59,15 +59,15 @@ class Form {
     } });
     this.file = pick({ id: 'choose-file', accept: '.glb,.zip,.gltf', multiple: true });
     this.folder = pick({ id: 'choose-folder', webkitdirectory: true });
-    this.drop = el('section', { class: 'drop', 'aria-label': 'Scene' },
+    this.drop = el('section', { class: 'drop', 'aria-label': 'Scene', 'data-needs': 'submit' },
       el('p', {}, el('strong', {}, 'Drop a scene here: '), 'a .glb, a .zip, or a folder with a .gltf'),
       el('div', { class: 'row' }, this.file, el('label', { class: 'button', for: 'choose-file' }, 'Choose a file'), this.folder, el('label', { class: 'button', for: 'choose-folder' }, 'Choose a folder')),
       this.bar, this.told);
     this.#dropAnywhere();
     this.report = el('section', { class: 'panel', hidden: true, 'aria-label': 'What is in the scene' });
-    this.form = el('form', { class: 'wishes', hidden: true, novalidate: true, onsubmit: (event) => { event.preventDefault(); this.submit(); }, oninput: () => this.check() });
-    this.verdict = el('section', { class: 'panel verdict', hidden: true, 'aria-label': 'What this would be' });
-    root.append(el('div', { class: 'head' }, el('h1', {}, 'New job')), this.drop,
+    this.form = el('form', { class: 'wishes', hidden: true, novalidate: true, 'data-needs': 'submit', onsubmit: (event) => { event.preventDefault(); this.submit(); }, oninput: () => this.check() });
+    this.verdict = el('section', { class: 'panel verdict', hidden: true, 'data-needs': 'submit', 'aria-label': 'What this would be' });
+    root.append(el('div', { class: 'head' }, el('h1', {}, 'New job')), refused('submit', 'render scenes'), this.drop,
       el('div', { class: 'split' }, el('div', { class: 'column' }, this.form), el('div', { class: 'column narrow' }, this.report, this.verdict)));
   }
 
@@ -86,6 +86,10 @@ class Form {
 
   /** Takes files that were dropped or chosen, or a promise of them. */
   async take(files) {
+    if (!maySubmit()) {
+      notice('This token may not send scenes: that takes one of role submit.', 'error');
+      return;
+    }
     const tell = (line, part) => {
       text(this.told, line);
       this.bar.hidden = part >= 1;
@@ -185,7 +189,8 @@ class Form {
       group('Stop at whichever comes first', el('div', { class: 'grid' },
         this.#field('samples', 'Samples a pixel', number(r.samples, { min: 1, step: 1, placeholder: '256' })),
         this.#field('error', 'Relative error', number(r.error ? Number((r.error * 100).toPrecision(8)) : null, { min: 0, placeholder: 'none' }), 'percent, certified'),
-        this.#field('seconds', 'Run time', number(r.seconds, { min: 0, placeholder: 'none' }), 'seconds'))),
+        this.#field('seconds', 'Run time', number(r.seconds, { min: 0, placeholder: 'none' }), 'seconds'),
+        this.#field('sampling', 'Samples go', select([['', 'everywhere alike'], ['adaptive', 'where the error is']], r.sampling ?? ''), 'the second: by path'))),
       wide('Lens and shutter', el('div', { class: 'grid' },
         this.#field('lens_radius', 'Radius of the lens', number(r.lens_radius, { min: 0, placeholder: 'pinhole' }), 'metres'),
         this.#field('focus_distance', 'In focus at', number(r.focus_distance, { min: 0 }), 'metres'),
@@ -231,13 +236,18 @@ class Form {
   }
 
   async #sky(input) {
+    const files = chosen(input);
+    // So that the same file can be chosen again.
+    input.value = '';
     try {
-      const scene = await packed(chosen(input));
+      const scene = await packed(files);
       const report = await bring(scene, (line) => text(this.told, line), this.signal);
       if (report.kind !== 'environment') throw new Error(`${scene.name} is no image to light a scene with`);
       this.fields.environment.value = report.id;
       this.check();
     } catch (error) {
+      if (error.name === 'AbortError') return;
+      text(this.faults.environment, error.message);
       notice(error.message, 'error');
     }
   }
@@ -247,7 +257,7 @@ class Form {
     const { fields } = this;
     const request = { scene: this.scene.id };
     const of = (key) => fields[key]?.value.trim() ?? '';
-    for (const key of ['name', 'camera', 'variant', 'region', 'strategies', 'weights', 'shadows']) if (of(key)) request[key] = of(key);
+    for (const key of ['name', 'camera', 'variant', 'region', 'strategies', 'weights', 'shadows', 'sampling']) if (of(key)) request[key] = of(key);
     for (const key of ['samples', 'seconds', 'bounces', 'lens_radius', 'focus_distance', 'environment_rotation', 'seed', 'replicates', 'priority', 'weight', 'max_workers']) {
       if (of(key)) request[key] = Number(of(key));
     }

@@ -1,7 +1,7 @@
 // Who renders: how fast, on what, what failed, who was put aside and why; and how many more there could be.
 
 import { get, send } from './client.js';
-import { confirmed, el, fill, notice, renew, repeat, text } from './dom.js';
+import { confirmed, el, fill, notice, refused, renew, repeat, text } from './dom.js';
 import { count, seconds, short, since, when } from './format.js';
 
 const PACE = 2000;
@@ -51,7 +51,7 @@ export async function show(root, { signal }) {
     el('p', {}, 'Nobody works here.'),
     el('p', {}, el('code', {}, `ovtigre work --server ${location.origin}`)));
   root.append(
-    el('div', { class: 'head' }, el('h1', {}, 'Workers'), el('label', { class: 'check' }, gone, 'also those that left')),
+    el('div', { class: 'head' }, el('h1', {}, 'Workers'), refused('admin', 'drain workers'), el('label', { class: 'check' }, gone, 'also those that left')),
     el('dl', { class: 'numbers' },
       el('div', {}, el('dt', {}, 'Working'), facts.active),
       el('div', {}, el('dt', {}, 'Could work now'), facts.desired),
@@ -63,7 +63,7 @@ export async function show(root, { signal }) {
   const drain = (worker) => {
     if (!['active', 'aside', 'lost'].includes(worker.state)) return null;
     const title = worker.state === 'lost' ? 'Let go' : 'Drain';
-    return el('button', { type: 'button', class: 'small', 'aria-label': `${title} ${worker.name}`, 'data-worker': worker.id, onclick: async () => {
+    return el('button', { type: 'button', class: 'small', 'aria-label': `${title} ${worker.name}`, 'data-worker': worker.id, 'data-needs': 'admin', onclick: async () => {
       if (!await confirmed(`${title} ${worker.name}? It gets no more batches.`, title)) return;
       try {
         await send(`/v1/workers/${worker.id}`, { method: 'DELETE' });

@@ -8,7 +8,11 @@ use super::{
         NewCheckpoint, NewCommit, NewJob, Progress, Settlement,
     },
 };
-use ovtigre_core::film::certificate::{Cause, Culprit, Doubt};
+use ovtigre_core::film::{
+    allocation::{Allocation, Allocations},
+    certificate::{Cause, Culprit, Doubt},
+    size::Size,
+};
 use ovtigre_proto::{
     curve::{CurveRow, LayerError},
     id::{BlobId, JobId, LeaseId, WorkerId},
@@ -76,6 +80,7 @@ pub(crate) async fn run<F: Future<Output = Arc<dyn Store>>>(open: impl Fn() -> F
     scenes_are_remembered_once(&*open().await).await;
     lists::jobs_are_listed_page_by_page(&*open().await).await;
     lists::jobs_are_listed_in_every_order(&*open().await).await;
+    lists::what_lists_go_by_follows_a_job(&*open().await).await;
     lists::a_list_says_how_jobs_stand(&*open().await).await;
     a_key_makes_one_job(&*open().await).await;
     a_change_needs_the_version(&*open().await).await;
@@ -231,7 +236,8 @@ async fn what_is_over_is_cleared_and_what_is_removed_is_gone(store: &dyn Store) 
     assert_eq!(store.unsettled_jobs().await.unwrap().len(), 1);
     let progress = Progress { samples: 2.5, batches: 1, worker_micros: 7, rays: 8, invalid: 9 };
     let mandate = store.take_merge(&job, "s", LONG).await.unwrap().unwrap();
-    let settlement = Settlement { mandate, progress, manifest: Some("m".to_owned()), certified: true };
+    let settlement =
+        Settlement { mandate, progress, part: 1.0, manifest: Some("m".to_owned()), certified: true };
     let change = JobChange { settlement: Some(settlement), ..JobChange::default() };
     assert!(store.change_job(&job, row.version, change).await.unwrap());
     let row = store.job(&job).await.unwrap().unwrap();
@@ -270,13 +276,27 @@ async fn curves_and_snapshots_are_kept(store: &dyn Store) {
         relative_error: None,
         estimated_bias: Some(-0.01),
     };
-    let checkpoint =
-        |look, row, layers: &[LayerError]| NewCheckpoint { look, row, layers: layers.to_vec(), progress };
+    let checkpoint = |look, row, layers: &[LayerError]| NewCheckpoint {
+        look,
+        row,
+        layers: layers.to_vec(),
+        progress,
+        allocations: None,
+    };
     assert_eq!(store.layers(&job).await.unwrap(), []);
     let mandate = store.take_merge(&job, "s", LONG).await.unwrap().unwrap();
     store.add_checkpoint(&job, mandate, checkpoint(1, row.clone(), &[])).await.unwrap();
     store.add_checkpoint(&job, mandate, checkpoint(2, second.clone(), &[layer, layer])).await.unwrap();
     store.add_checkpoint(&job, mandate, checkpoint(1, second.clone(), &[layer])).await.unwrap();
+    assert_eq!(store.allocations(&job).await.unwrap(), None);
+    for shares in [[2, 64], [8, 8]] {
+        let half = |from| Allocation::new(Size { width: 32, height: 9 }, from, shares.to_vec());
+        let allocations = Some(Allocations([half(16), half(17)]));
+        let decided = NewCheckpoint { allocations, ..checkpoint(2, second.clone(), &[]) };
+        store.add_checkpoint(&job, mandate, decided).await.unwrap();
+        let kept = store.allocations(&job).await.unwrap().unwrap();
+        assert_eq!((kept.of(2).shares(), kept.of(3).from()), (&[2, 64][..], 17), "the first decision stays");
+    }
     assert_eq!(store.layers(&job).await.unwrap(), [layer, layer]);
     assert_eq!(store.curve(&job).await.unwrap(), [row, second]);
     assert_eq!(store.job(&job).await.unwrap().unwrap().progress, progress);
@@ -378,7 +398,7 @@ async fn one_appends_to_a_job(store: &dyn Store) {
         |done: Result<(), StoreError>| assert!(matches!(done, Err(StoreError::Superseded)), "{done:?}");
     lost(store.set_snapshot(&job, first, lane, 9).await);
     lost(store.publish(&job, first, progress).await);
-    let settlement = Settlement { mandate: first, progress, manifest: None, certified: false };
+    let settlement = Settlement { mandate: first, progress, part: 1.0, manifest: None, certified: false };
     let change =
         JobChange { state: Some(JobState::Done), settlement: Some(settlement), ..JobChange::default() };
     lost(store.change_job(&job, 1, change).await.map(drop));

@@ -83,7 +83,8 @@ pub(super) async fn a_job_is_extended(store: &dyn Store) {
     // One that is over goes on at what is kept of each lane.
     let mandate = store.take_merge(&job, "m", LONG).await.unwrap().unwrap();
     store.set_snapshot(&job, mandate, Lane { replicate: 0, region: 0 }, 1).await.unwrap();
-    let settlement = Settlement { mandate, progress: Progress::default(), manifest: None, certified: false };
+    let settlement =
+        Settlement { mandate, progress: Progress::default(), part: 1.0, manifest: None, certified: false };
     let over =
         JobChange { state: Some(JobState::Done), settlement: Some(settlement), ..JobChange::default() };
     assert!(store.change_job(&job, row.version, over).await.unwrap());

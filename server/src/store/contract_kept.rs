@@ -119,7 +119,8 @@ pub(super) async fn a_job_and_the_removal_of_its_scene_are_never_both_done(store
 async fn settled(store: &dyn Store, name: &str) -> JobId {
     let job = with_job(store, name).await;
     let mandate = store.take_merge(&job, "m", LONG).await.unwrap().unwrap();
-    let settlement = Settlement { mandate, progress: Progress::default(), manifest: None, certified: false };
+    let settlement =
+        Settlement { mandate, progress: Progress::default(), part: 0.0, manifest: None, certified: false };
     let over =
         JobChange { state: Some(JobState::Done), settlement: Some(settlement), ..JobChange::default() };
     assert!(store.change_job(&job, 1, over).await.unwrap());

@@ -3,6 +3,7 @@
 use super::row::JobRow;
 use ovtigre_proto::{
     curve::{CurveRow, LayerError},
+    id::JobId,
     status::JobState,
 };
 use std::fmt;
@@ -34,6 +35,46 @@ pub enum Key {
     State,
     /// Their priorities.
     Priority,
+    /// Their relative errors at their latest checkpoints.
+    Error,
+    /// The parts of their samples that are drawn.
+    Progress,
+    /// When they are expected to be done.
+    Eta,
+    /// How many workers hold batches of them.
+    Workers,
+}
+
+/// Of what is not known, in a list's order: more than any that is.
+pub const NEVER: i64 = 9_000_000_000_000_000_000;
+
+/// A number in billionths; `NEVER` where there is none, and of 10⁹ and more.
+pub fn billionths(number: Option<f64>) -> i64 {
+    number.filter(|number| *number < 1e9).map_or(NEVER, |number| (number * 1e9).round() as i64)
+}
+
+/// What lists of jobs go by that changes while a job is rendered: whole numbers, so that a place in a list is exact.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Ranks {
+    /// Relative error at the latest checkpoint, in billionths.
+    pub error_ppb: i64,
+    /// The part of the samples that is drawn, in billionths.
+    pub part_ppb: i64,
+    /// When it is expected to be done, in milliseconds since 1970.
+    pub expected_ms: i64,
+    /// Workers that hold one of its batches.
+    pub workers: i64,
+}
+
+/// How far a job is.
+#[derive(Clone, Debug)]
+pub struct Outlook {
+    /// Which.
+    pub job: JobId,
+    /// The part of what was asked for that is in its picture, 0 to 1.
+    pub part: f64,
+    /// Seconds until it is expected to be done, where that is known.
+    pub left: Option<f64>,
 }
 
 /// Which way.
@@ -84,6 +125,10 @@ impl Place {
             Key::Name => Mark::Text(row.name.to_ascii_lowercase()),
             Key::State => Mark::Text(row.state.name().to_owned()),
             Key::Priority => Mark::Number(row.priority.into()),
+            Key::Error => Mark::Number(row.ranks.error_ppb),
+            Key::Progress => Mark::Number(row.ranks.part_ppb),
+            Key::Eta => Mark::Number(row.ranks.expected_ms),
+            Key::Workers => Mark::Number(row.ranks.workers),
         };
         Self { mark, sequence: row.sequence }
     }
@@ -94,8 +139,8 @@ impl Place {
         let mark = match (key, mark.map(unhex)) {
             (Key::Created, None) => Mark::Nothing,
             (Key::Name | Key::State, Some(mark)) => Mark::Text(mark?),
-            (Key::Priority, Some(mark)) => Mark::Number(mark?.parse().ok()?),
-            _ => return None,
+            (Key::Created | Key::Name | Key::State, _) => return None,
+            (_, mark) => Mark::Number(mark??.parse().ok()?),
         };
         Some(Self { mark, sequence: sequence.parse().ok()? })
     }
@@ -148,6 +193,7 @@ mod tests {
             (Mark::Text("zoë .".to_owned()), "17.7a6fc3ab202e", Key::Name),
             (Mark::Text(String::new()), "17.", Key::State),
             (Mark::Number(-3), "17.2d33", Key::Priority),
+            (Mark::Number(NEVER), "17.39303030303030303030303030303030303030", Key::Error),
         ] {
             assert_eq!(place(mark.clone()).to_string(), text);
             assert_eq!(Place::parse(text, key), Some(place(mark)));

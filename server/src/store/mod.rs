@@ -20,8 +20,9 @@ mod contract_lists;
 
 use error::Result;
 use kept::{KeptJob, UnfiledJob};
-use list::{JobFilter, Standing};
+use list::{JobFilter, Outlook, Standing};
 use notice::NoticeRow;
+use ovtigre_core::film::allocation::Allocations;
 use ovtigre_proto::{
     curve::{CurveRow, LayerError},
     id::{BlobId, JobId, LeaseId, WorkerId},
@@ -95,6 +96,12 @@ pub trait Store: Send + Sync + fmt::Debug {
     async fn jobs(&self, filter: JobFilter) -> Result<Vec<JobRow>>;
     /// What a list says of each of those jobs beside its row, in the same order.
     async fn standings(&self, jobs: &[JobId]) -> Result<Vec<Standing>>;
+    /// Seconds for which each of those jobs has run, in the same order; `None` where it does not run.
+    async fn run_times(&self, jobs: &[JobId]) -> Result<Vec<Option<f64>>>;
+    /// Lists go by how far those jobs are from now on, where they are not settled.
+    async fn look_out(&self, outlooks: Vec<Outlook>) -> Result<()>;
+    /// Lists go by how many workers hold batches of each job now.
+    async fn count_workers(&self) -> Result<()>;
     /// Jobs that are not over, or whose files do not have their last form, the oldest first.
     async fn unsettled_jobs(&self) -> Result<Vec<JobRow>>;
     /// What changes most of those jobs.
@@ -146,6 +153,8 @@ pub trait Store: Send + Sync + fmt::Debug {
     async fn add_checkpoint(&self, job: &JobId, mandate: Mandate, checkpoint: NewCheckpoint) -> Result<()>;
     /// The layers' errors at a job's latest checkpoint; nothing before the first.
     async fn layers(&self, job: &JobId) -> Result<Vec<LayerError>>;
+    /// How a job's samples are allocated; `None` before that is decided.
+    async fn allocations(&self, job: &JobId) -> Result<Option<Allocations>>;
     /// A job's checkpoints in order.
     async fn curve(&self, job: &JobId) -> Result<Vec<CurveRow>>;
 

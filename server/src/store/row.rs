@@ -1,8 +1,8 @@
 //! What the store keeps, row by row.
 
-use super::notice::Webhook;
+use super::{list::Ranks, notice::Webhook};
 use jiff::Timestamp;
-use ovtigre_core::film::batch::Batch;
+use ovtigre_core::film::{allocation::Allocations, batch::Batch};
 use ovtigre_proto::{
     curve::{CurveRow, LayerError},
     id::{BlobId, JobId, LeaseId, WorkerId},
@@ -154,6 +154,8 @@ pub struct JobRow {
     pub settled: bool,
     /// The class of processors whose bits its sums have, once its first batch was handed out.
     pub class: Option<String>,
+    /// What lists go by.
+    pub ranks: Ranks,
 }
 
 /// What changes most of a job that is not settled.
@@ -214,6 +216,8 @@ pub struct Settlement {
     pub mandate: Mandate,
     /// What is in the picture that is kept.
     pub progress: Progress,
+    /// The part of what was asked for that is in it, 0 to 1.
+    pub part: f64,
     /// The set of batches in it; `None` where there is no picture.
     pub manifest: Option<String>,
     /// Whether the error target was reached.
@@ -378,6 +382,8 @@ pub struct NewCheckpoint {
     pub layers: Vec<LayerError>,
     /// What is in the picture.
     pub progress: Progress,
+    /// How samples are allocated from here on, where that is decided here; what was decided before stays.
+    pub allocations: Option<Allocations>,
 }
 
 /// Another specification of a job.

@@ -1,209 +1,337 @@
-//! Measures what method `auto` chooses against every fixed method, and prints the table of docs/PERFORMANCE.md:
-//! `cargo run --release -p ovtigre-tests --bin auto -- [--seconds N] [--scene NAME] [--samples N] [--width N]`.
+//! Measures what method `auto` chooses against every fixed method, and prints the tables of docs/PERFORMANCE.md:
+//! `cargo run --release -p ovtigre-tests --bin auto -- [--scene NAME] [--jobs WIDTHxSAMPLES,…] [--seeds N]`.
 //!
-//! Time is that of one thread on a processor, so that others on the machine count little.
+//! Time is that of one thread on a processor, so that others on the machine count little; methods take turns.
 
 use anyhow::{Context as _, bail};
+use glam::Vec3;
 use ovtigre_core::{
     film::{
         append::Prefix,
         batch::{Batch, Block},
-        estimate::picture,
+        estimate::{Picture, picture},
         reference::Reference,
         size::Size,
+        sum::Sum,
     },
     gltf::limits::Limits,
-    path::{expression::language::Language, reach::unreachable},
+    path::{
+        expression::language::Language,
+        reach::{LightKind, unreachable},
+    },
     render::{
         batch::render,
-        inspect::{by_chance, inspect},
-        pilot::{Chance, Pilot, Plan, pilot},
+        inspect::{by_chance, casts, inspect},
+        pilot::{Chance, NoPilot, Pilot, Plan, pilot},
         prepare::{Prepared, prepare},
         progress::Progress,
     },
     settings::{FULL, Method, Settings},
 };
 use ovtigre_tests::{
+    matrix,
     picture::settings,
     room::room,
     scenes::{cornell, two_rooms},
     showcase::{caustic, lamp_behind_glass},
+    stage,
     thread_time::thread_seconds,
 };
 use std::{fmt::Write as _, io::Write as _};
 
-const METHODS: [Method; 3] = [Method::Path, Method::Bidirectional, Method::Light];
-const REPLICATES: u32 = 16;
+const METHODS: [Method; 4] = [Method::Path, Method::Bidirectional, Method::Caustics, Method::Light];
+/// Of them, and of a job.
+const REPLICATES: u32 = 8;
+const REPLICATES_OF_A_JOB: u32 = 4;
 /// Of the pictures that are compared.
 const SIZE: Size = Size { width: 96, height: 54 };
 /// Seed of references; what is compared has others.
 const REFERENCE_SEED: u64 = u64::MAX;
-/// Time of a reference over that of what is compared with it.
+/// Time of a reference over that of the longest of what is compared with it.
 const REFERENCE: f64 = 4.0;
 
-struct Arguments {
-    seconds: f64,
-    scene: Option<String>,
-    samples: u32,
+/// A job of a frame so wide, 16:9, with so many samples a pixel.
+#[derive(Clone, Copy, Debug)]
+struct Job {
     width: u32,
+    samples: u32,
+}
+
+struct Arguments {
+    scene: Option<String>,
+    jobs: Vec<Job>,
+    seeds: u64,
 }
 
 fn main() -> anyhow::Result<()> {
-    let mut asked = Arguments { seconds: 8.0, scene: None, samples: 256, width: 480 };
+    let jobs = vec![Job { width: 480, samples: 256 }];
+    let mut asked = Arguments { scene: None, jobs, seeds: 8 };
     let mut arguments = std::env::args().skip(1);
     while let Some(flag) = arguments.next() {
         let value = arguments.next().with_context(|| format!("{flag} needs a value"))?;
         match flag.as_str() {
-            "--seconds" => asked.seconds = value.parse()?,
-            "--samples" => asked.samples = value.parse()?,
-            "--width" => asked.width = value.parse()?,
+            "--seeds" => asked.seeds = value.parse()?,
+            "--jobs" => asked.jobs = value.split(',').map(job).collect::<anyhow::Result<_>>()?,
             "--scene" => asked.scene = Some(value),
             _ => bail!("{flag} is no flag"),
         }
     }
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
-    let scenes: [(&str, Vec<u8>); 5] = [
+    let scenes: [(&str, Vec<u8>); 9] = [
         ("room", room()),
         ("cornell", cornell()),
         ("two-rooms", two_rooms()),
         ("caustic", caustic()),
         ("lamp-behind-glass", lamp_behind_glass()),
+        ("glossy", matrix::smooth_normals().glb),
+        ("coated", matrix::coated().glb),
+        ("rough-glass", matrix::ball_of_glass(0.5).glb),
+        ("under-sky", under_sky()),
     ];
     for (name, glb) in scenes.iter().filter(|(name, _)| asked.scene.as_deref().is_none_or(|s| s == *name)) {
-        let table = pool.install(|| compare(name, glb, &asked))?;
-        writeln!(std::io::stdout(), "{table}")?;
+        let tables = pool.install(|| compare(name, glb, &asked))?;
+        writeln!(std::io::stdout(), "{tables}")?;
     }
     Ok(())
 }
 
-/// What a method did in its time.
+/// Plastic and metal without a lamp, so that there is a sky.
+fn under_sky() -> Vec<u8> {
+    stage::room(0.0, |glb| {
+        stage::smooth_sphere(glb, stage::plastic(0.3), Vec3::new(-0.4, -0.5, 0.0), 0.45);
+        stage::smooth_sphere(glb, stage::metal(0.2), Vec3::new(0.5, -0.4, 0.2), 0.4);
+    })
+}
+
+fn job(text: &str) -> anyhow::Result<Job> {
+    let (width, samples) = text.split_once('x').with_context(|| format!("{text} is no WIDTHxSAMPLES"))?;
+    Ok(Job { width: width.parse()?, samples: samples.parse()? })
+}
+
+/// A method on trial, and what it did in its time.
 struct Measured {
-    method: Method,
+    settings: Settings,
+    lanes: Vec<Prefix>,
+    /// Of each replicate.
+    samples: u32,
     seconds: f64,
-    samples_a_pixel: u32,
-    samples: f64,
-    rays: u64,
     error: f64,
 }
 
 impl Measured {
+    fn new(method: Method, settings: &Settings) -> Self {
+        let lanes = (0..settings.replicates).map(|r| Prefix::empty(settings.size.frame(), r, 1)).collect();
+        let settings = Settings { method, ..settings.clone() };
+        Self { settings, lanes, samples: 1, seconds: 0.0, error: 0.0 }
+    }
+
+    /// Seconds of one sample of all pixels of a replicate.
+    fn once(&self, prepared: &Prepared) -> f64 {
+        let start = thread_seconds();
+        self.block(prepared, 0, 4);
+        0.25 * (thread_seconds() - start)
+    }
+
+    fn block(&self, prepared: &Prepared, replicate: u32, count: u32) -> Sum {
+        let block = Block { index: 0, start: 0, count };
+        let batch = Batch { region: self.settings.size.frame(), replicate, block };
+        render(prepared, &self.settings, batch, &Progress::new()).expect("not stopped")
+    }
+
+    /// Renders one replicate.
+    fn take_turn(&mut self, prepared: &Prepared, replicate: u32) {
+        let start = thread_seconds();
+        let sum = self.block(prepared, replicate, self.samples);
+        self.seconds += thread_seconds() - start;
+        self.lanes[replicate as usize].append(&sum).expect("the first");
+    }
+
+    fn picture(&self) -> Picture {
+        picture(SIZE, SIZE.frame(), std::slice::from_ref(&self.lanes))
+    }
+
+    fn method(&self) -> Method {
+        self.settings.method
+    }
+
+    /// Samples of all pixels and replicates.
+    fn all_samples(&self) -> f64 {
+        f64::from(self.samples * self.settings.replicates) * self.settings.size.pixels() as f64
+    }
+
+    fn seconds_a_sample(&self) -> f64 {
+        self.seconds / self.all_samples()
+    }
+
     /// The time for an error is in proportion to it.
     fn cost(&self) -> f64 {
         self.error * self.error * self.seconds
     }
 }
 
+/// A picture that is known well enough for a job of so many samples by `path`.
+fn reference(prepared: &Prepared, settings: &Settings, samples: u32) -> Reference {
+    let seconds =
+        Measured::new(Method::Path, settings).once(prepared) * f64::from(samples / REPLICATES_OF_A_JOB);
+    let other = Settings { seed: REFERENCE_SEED, ..settings.clone() };
+    let mut reference = Measured::new(Method::Bidirectional, &other);
+    reference.samples = (REFERENCE * seconds / reference.once(prepared)).log2().round().exp2() as u32;
+    (0..settings.replicates).for_each(|replicate| reference.take_turn(prepared, replicate));
+    Reference::of_picture(&reference.picture())
+}
+
+/// Every method, in about the time of so many samples by `path`: how the error falls with more of them differs.
+fn measure(prepared: &Prepared, settings: &Settings, samples: u32, reference: &Reference) -> Vec<Measured> {
+    let mut all: Vec<Measured> = METHODS.map(|method| Measured::new(method, settings)).into();
+    let once: Vec<f64> = all.iter().map(|one| one.once(prepared)).collect();
+    for (one, seconds) in all.iter_mut().zip(&once) {
+        let by_path = f64::from(samples / REPLICATES_OF_A_JOB);
+        one.samples = (by_path * once[0] / seconds).log2().round().exp2().max(1.0) as u32;
+    }
+    for replicate in 0..settings.replicates {
+        for one in &mut all {
+            one.take_turn(prepared, replicate);
+        }
+    }
+    for one in &mut all {
+        one.error = reference.relative_error(&one.picture().planes[0]);
+    }
+    all
+}
+
 fn compare(name: &str, glb: &[u8], asked: &Arguments) -> anyhow::Result<String> {
     let contents = inspect(glb, &Limits::default())?;
     let language = Language::compile(&[FULL])?;
     let around = contents.surroundings(&language.tags().collect::<Vec<_>>());
-    let makes_all = |method: &Method| unreachable(&language, *method, &around, None).is_empty();
-    let job = settings(asked.width, asked.width * 9 / 16, 4);
-    let plan = Plan {
-        region: job.size.frame(),
-        settings: job,
-        samples: asked.samples,
-        error_target: None,
-        seconds: None,
-        triangles: contents.report.triangles,
-        chance: match by_chance(Method::Path, contents.letters, contents.brightest) {
-            None => Chance::Never,
-            Some(_) => Chance::Sometimes,
-        },
-        methods: METHODS.into_iter().filter(makes_all).collect(),
+    let is_open = |method: &Method| {
+        unreachable(&language, *method, &around, None).is_empty()
+            && (*method != Method::Caustics || casts(contents.letters))
     };
-    let start = thread_seconds();
-    let (tried, _) = pilot(glb, None, &plan)?;
-    let pilot_seconds = thread_seconds() - start;
-
+    let plan = |job: Job, seed: u64| {
+        let settings = Settings { seed, ..settings(job.width, job.width * 9 / 16, 4) };
+        Plan {
+            region: settings.size.frame(),
+            settings,
+            samples: job.samples,
+            error_target: None,
+            seconds: None,
+            triangles: contents.report.triangles,
+            chance: match by_chance(Method::Path, contents.letters, contents.brightest) {
+                None => Chance::Never,
+                Some(_) if around.lights.iter().all(|(kind, _)| *kind != LightKind::Surface) => Chance::Never,
+                Some(_) => Chance::Sometimes,
+            },
+            methods: METHODS.into_iter().filter(is_open).collect(),
+        }
+    };
     let small = settings(SIZE.width, SIZE.height, REPLICATES);
     let prepared = prepare(glb, None, &small)?;
-    let other = Settings { method: Method::Bidirectional, seed: REFERENCE_SEED, ..small.clone() };
-    let (lanes, _) = run(&prepared, &other, REFERENCE * asked.seconds);
-    let reference = Reference::of_picture(&picture(SIZE, SIZE.frame(), &lanes));
-    let measured = METHODS.map(|method| {
-        let (lanes, seconds) = run(&prepared, &Settings { method, ..small.clone() }, asked.seconds);
-        let error = reference.relative_error(&picture(SIZE, SIZE.frame(), &lanes).planes[0]);
-        let samples_a_pixel = lanes[0].iter().map(Prefix::samples).sum();
-        let rays = lanes[0].iter().map(Prefix::rays).sum();
-        let samples = f64::from(samples_a_pixel) * SIZE.pixels() as f64;
-        Measured { method, seconds, samples_a_pixel, samples, rays, error }
-    });
-    let about = format!("{name}: the reference is known to {:.4}", reference.own_error());
-    table(&about, &plan, (&tried, pilot_seconds), &measured)
+    let longest = asked.jobs.iter().map(|job| job.samples).max().context("there are no jobs")?;
+    let reference = reference(&prepared, &small, longest);
+    let mut out = format!("{name}: the reference is known to {:.4}\n", reference.own_error());
+    let mut measured: Vec<Measured> = Vec::new();
+    for (i, job) in asked.jobs.iter().enumerate() {
+        let tried: Vec<Tried> = (0..asked.seeds).map(|seed| Tried::new(glb, &plan(*job, seed))).collect();
+        if i == 0 || asked.jobs[i - 1].samples != job.samples {
+            measured = measure(&prepared, &small, job.samples, &reference);
+        }
+        let open: Vec<&Measured> = measured.iter().filter(|one| is_open(&one.method())).collect();
+        let best = open.iter().map(|one| one.cost()).fold(f64::INFINITY, f64::min);
+        if i == 0 || asked.jobs[i - 1].samples != job.samples {
+            fixed(&mut out, &measured, best, &tried[0])?;
+        }
+        chosen(&mut out, *job, &tried, (&open, best))?;
+    }
+    Ok(out)
 }
 
-/// Replicates, and the seconds that they took: the time is not used up where another block would take too long.
-fn run(prepared: &Prepared, settings: &Settings, seconds: f64) -> (Vec<Vec<Prefix>>, f64) {
-    let region = settings.size.frame();
-    let mut lanes = vec![(0..settings.replicates).map(|r| Prefix::empty(region, r, 1)).collect::<Vec<_>>()];
-    let start = thread_seconds();
-    let (mut index, mut drawn) = (0, 0);
-    loop {
-        let block = Block { index, start: drawn, count: drawn.max(1) };
-        for prefix in &mut lanes[0] {
-            let batch = Batch { region, replicate: prefix.replicate(), block };
-            let sum = render(prepared, settings, batch, &Progress::new()).expect("not stopped");
-            prefix.append(&sum).expect("in order");
-        }
-        (index, drawn) = (index + 1, drawn + block.count);
-        let spent = thread_seconds() - start;
-        if 1.5 * spent > seconds {
-            return (lanes, spent);
-        }
+/// A pilot, and the time it took.
+struct Tried {
+    found: Result<Pilot, NoPilot>,
+    method: Method,
+    seconds: f64,
+}
+
+impl Tried {
+    fn new(glb: &[u8], plan: &Plan) -> Self {
+        let start = thread_seconds();
+        let found = pilot(glb, None, plan).map(|(pilot, _)| pilot);
+        let method = found.as_ref().map_or_else(|_| plan.untried(), |pilot| pilot.method);
+        Self { found, method, seconds: thread_seconds() - start }
     }
 }
 
-fn table(
-    about: &str,
-    plan: &Plan,
-    (pilot, pilot_seconds): (&Pilot, f64),
-    measured: &[Measured],
-) -> anyhow::Result<String> {
-    let mut out = format!("{about}\n\n");
-    let whole = measured.iter().filter(|one| pilot.trials.iter().any(|trial| trial.method == one.method));
-    let best = whole.map(Measured::cost).fold(f64::INFINITY, f64::min);
+/// Each method, and what the first pilot says of it.
+fn fixed(out: &mut String, measured: &[Measured], best: f64, tried: &Tried) -> anyhow::Result<()> {
     writeln!(
         out,
-        "| method | samples | rays a sample | µs a sample | true error | time for the same error | by the pilot |"
+        "\n| method | samples | rays a sample | µs a sample | true error | time for the same error | by the pilot |"
     )?;
     writeln!(out, "| --- | ---: | ---: | ---: | ---: | ---: | ---: |")?;
     for one in measured {
-        let tried = pilot.trials.iter().find(|trial| trial.method == one.method);
-        let [time, tried] = tried.map_or(["–".to_owned(), "leaves out paths".to_owned()], |tried| {
-            let time = format!("{:.2}", one.cost() / best);
-            [
-                time,
-                format!(
-                    "{:.2} (error {:.3}, by its error {:.3}, missed {:.3})",
-                    tried.time_ratio,
-                    tried.relative_error,
-                    tried.square_error.sqrt(),
-                    tried.missed
-                ),
-            ]
+        let trials = tried.found.iter().flat_map(|pilot| &pilot.trials);
+        let by_pilot = trials.into_iter().find(|trial| trial.method == one.method());
+        let by_pilot = by_pilot.map_or("–".to_owned(), |trial| {
+            format!(
+                "{:.2} (error {:.3}, by its error {:.3}, missed {:.3})",
+                trial.time_ratio,
+                trial.relative_error,
+                trial.square_error.sqrt(),
+                trial.missed
+            )
         });
+        let rays: u64 = one.lanes.iter().map(Prefix::rays).sum();
         writeln!(
             out,
-            "| {} | {} | {:.2} | {:.2} | {:.4} | {time} | {tried} |",
-            one.method.name(),
-            one.samples_a_pixel,
-            one.rays as f64 / one.samples,
-            1e6 * one.seconds / one.samples,
+            "| {} | {} | {:.2} | {:.2} | {:.4} | {:.2} | {by_pilot} |",
+            one.method().name(),
+            one.samples * one.settings.replicates,
+            rays as f64 / one.all_samples(),
+            1e6 * one.seconds_a_sample(),
             one.error,
+            one.cost() / best,
         )?;
     }
-    let taken = measured.iter().find(|one| one.method == pilot.method).context("one of them")?;
-    let job = plan.settings.size.pixels() as f64 * f64::from(plan.samples);
-    let share = pilot_seconds / (taken.seconds / taken.samples * job);
+    writeln!(out)?;
+    Ok(())
+}
+
+/// What pilots of several seeds choose for a job.
+fn chosen(
+    out: &mut String,
+    job: Job,
+    tried: &[Tried],
+    (open, best): (&[&Measured], f64),
+) -> anyhow::Result<()> {
+    let all = tried.len() as f64;
+    let pixels = f64::from(job.width * (job.width * 9 / 16));
+    // Of the job by the method that is taken: the pilot's time, and the whole time over that of the best.
+    let mut rows = Vec::new();
+    for one in tried {
+        let taken = open.iter().find(|measured| measured.method() == one.method).context("one of them")?;
+        let share = one.seconds / (taken.seconds_a_sample() * pixels * f64::from(job.samples));
+        rows.push((share, taken.cost() / best * (1.0 + share)));
+    }
+    let mean = |of: &dyn Fn(&(f64, f64)) -> f64| rows.iter().map(of).sum::<f64>() / all;
+    let taken: Vec<String> = (open.iter())
+        .map(|one| (one.method(), tried.iter().filter(|tried| tried.method == one.method()).count()))
+        .filter(|(_, times)| *times > 0)
+        .map(|(method, times)| format!("{} {times}", method.name()))
+        .collect();
+    let worst = rows.iter().map(|row| row.1).fold(0.0, f64::max);
+    let worst_fixed = open.iter().map(|one| one.cost()).fold(0.0, f64::max) / best;
+    let counted = tried.iter().flat_map(|one| &one.found).map(|pilot| pilot.share).fold(0.0, f64::max);
     writeln!(
         out,
-        "\nauto: {}, {:.2} of the time of the best, the pilot's {:.2} s included: {:.2} % of the job, {:.2} % as counted",
-        pilot.method.name(),
-        taken.cost() / best * (1.0 + share),
-        pilot_seconds,
-        100.0 * share,
-        100.0 * pilot.share,
+        "{}x{}: {}; {:.2} of the time of the best on average, {worst:.2} at most, by the worst method {worst_fixed:.2}; \
+         pilot {:.2} s, {:.2} % of the job, {:.2} % as counted at most",
+        job.width,
+        job.samples,
+        taken.join(", "),
+        mean(&|row| row.1),
+        tried.iter().map(|one| one.seconds).sum::<f64>() / all,
+        100.0 * mean(&|row| row.0),
+        100.0 * counted,
     )?;
-    Ok(out)
+    Ok(())
 }

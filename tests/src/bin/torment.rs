@@ -38,8 +38,9 @@ fn main() -> anyhow::Result<()> {
     if std::env::args().any(|word| word == "begin") {
         return Ok(begin()?);
     }
-    let numbers: Vec<u64> = std::env::args().filter_map(|a| a.parse().ok()).collect();
-    let (seconds, seed) = (numbers.first().copied().unwrap_or(60), numbers.get(1).copied().unwrap_or(1));
+    let mut numbers = std::env::args().filter(|word| word.parse::<f64>().is_ok());
+    let seconds = numbers.next().map_or(Ok(60.0), |word| word.parse())?;
+    let seed = numbers.next().map_or(Ok(1_u64), |word| word.parse())?;
     // Panics are told of with the bytes that brought them about; some decoders' are caught on purpose.
     std::panic::set_hook(Box::new(|_| ()));
     let mut found = 0;
@@ -50,8 +51,8 @@ fn main() -> anyhow::Result<()> {
         let begun = Instant::now();
         let mut count = 0;
         let mut next = seed;
-        while begun.elapsed() < Duration::from_secs(seconds) {
-            let over = |n: u64| !n.is_multiple_of(16) || begun.elapsed() < Duration::from_secs(seconds);
+        while begun.elapsed() < Duration::from_secs_f64(seconds) {
+            let over = |n: u64| !n.is_multiple_of(16) || begun.elapsed() < Duration::from_secs_f64(seconds);
             match torment(target, next, over) {
                 Ok(borne) => count += borne,
                 Err(stumbled) => {

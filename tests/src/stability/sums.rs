@@ -75,7 +75,13 @@ fn batches(budget: Budget) -> Finding {
         }
         let block = Block { index, start: index, count: 1 };
         let batch = Batch { region, replicate: 0, block };
-        let sum = Sum { batch, planes: vec![plane], invalid: InvalidSamples::default(), rays: 1 };
+        let sum = Sum {
+            batch,
+            planes: vec![plane],
+            invalid: InvalidSamples::default(),
+            rays: 1,
+            tile_rays: Vec::new(),
+        };
         prefix.append(&sum).expect("in order");
     }
     let off = |(got, exact): (&f64, &i128)| (got * 2_f64.powi(60) / *exact as f64 - 1.0).abs();

@@ -10,7 +10,7 @@ use crate::path::mis::recursive;
 use crate::path::rules::Weighing;
 use crate::path::tally::{Receiver, Tally};
 use crate::path::throughput::Throughput;
-use crate::path::vertex::Density;
+use crate::path::vertex::{Cast, Density};
 use crate::path::walk::{EdgeKind, Sight, Walk};
 use crate::scene::emission::EmissionDensity;
 use crate::scene::interaction::Interaction;
@@ -143,6 +143,14 @@ pub(in crate::path) fn weight<S: Throughput<EyeState>>(walk: &Walk<'_, EyeState,
         }
         Weighing::FromEye => 1.0 / (1.0 + hit.next_event * walk.partial.near),
         Weighing::ToLens => 0.0,
+        Weighing::Caustics if walk.scatterings == 0 => 1.0,
+        Weighing::Caustics => {
+            let emitted = match walk.cast {
+                Cast::Diffuse => 0.0,
+                Cast::Caustic => f64::from(hit.emission.origin) * f64::from(hit.emission.emission),
+            };
+            recursive::hit(walk.rules.heuristic(), &walk.partial, hit.next_event, emitted)
+        }
         Weighing::All(h) => {
             let emitted = f64::from(hit.emission.origin) * f64::from(hit.emission.emission);
             recursive::hit(*h, &walk.partial, hit.next_event, emitted)

@@ -76,7 +76,7 @@ pub(in crate::path) fn weight<S: Throughput<EyeState>, L>(
         eye_reverse: f64::from(vertex.reverse_pdf(direction)),
     };
     match &walk.rules.weighing {
-        Weighing::FromEye | Weighing::ToLens => 0.0,
+        Weighing::FromEye | Weighing::ToLens | Weighing::Caustics => 0.0,
         Weighing::All(h) => recursive::join(*h, &light.partial, &walk.partial, &bridge),
         Weighing::Chosen(chosen) => {
             let joint = Joint {

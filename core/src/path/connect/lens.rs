@@ -87,6 +87,10 @@ pub(in crate::path) fn weight<L: Throughput<LightState>>(
         Weighing::All(h) => {
             recursive::to_lens(*h, &walk.partial, end.from_eye / walk.rules.light_paths, reverse)
         }
+        Weighing::Caustics => {
+            let from_eye = end.from_eye / walk.rules.light_paths;
+            recursive::to_lens(walk.rules.heuristic(), &walk.without_inner_joints(), from_eye, reverse)
+        }
         Weighing::Chosen(chosen) => {
             let lens = Link { forward: 1.0, reverse: 0.0, jacobian: 0.0, specular: false };
             let joint = Joint {
@@ -132,7 +136,7 @@ pub fn light_to_lens<E: Throughput<EyeState>, L: Throughput<LightState>>(
     let technique = (1, 1);
     let from_eye = shown.seen.pdf.over_area(shown.squared, shown.cos);
     let weight = match &rules.weighing {
-        Weighing::FromEye => 0.0,
+        Weighing::FromEye | Weighing::Caustics => 0.0,
         Weighing::ToLens => 1.0,
         Weighing::All(h) => recursive::light_to_lens(*h, from_eye / (rules.light_paths * shown.place)),
         Weighing::Chosen(chosen) => {

@@ -11,7 +11,7 @@ use crate::path::mis::recursive::{self, NextEventDensities};
 use crate::path::rules::Weighing;
 use crate::path::tally::{Receiver, Tally};
 use crate::path::throughput::Throughput;
-use crate::path::vertex::{Vertex, Weight};
+use crate::path::vertex::{Cast, Vertex, Weight};
 use crate::path::walk::Walk;
 use crate::scene::emission::EmissionDensity;
 use crate::scene::light::{FoundBy, NextEvent, ShadowEnd};
@@ -93,12 +93,17 @@ pub(in crate::path) fn weight<S: Throughput<EyeState>>(
         Weighing::FromEye if walk.rules.shadows == Shadows::Off => 1.0,
         Weighing::FromEye => 1.0 / (1.0 + hit),
         Weighing::ToLens => 0.0,
-        Weighing::All(h) => {
+        Weighing::Caustics if vertex.cast() == Cast::Diffuse => 1.0 / (1.0 + hit),
+        Weighing::Caustics | Weighing::All(_) => {
             let around = Around::new(walk, vertex, light, event);
             let picked = f64::from(around.emission.origin) / around.next_event;
             let reverse = f64::from(vertex.reverse_pdf(event.direction));
             let densities = NextEventDensities { hit, picked, first_edge: around.first_edge, reverse };
-            recursive::next_event(*h, &walk.partial, &densities)
+            let eye = match walk.rules.weighing {
+                Weighing::Caustics => walk.without_inner_joints(),
+                _ => walk.partial,
+            };
+            recursive::next_event(walk.rules.heuristic(), &eye, &densities)
         }
         Weighing::Chosen(chosen) => {
             let around = Around::new(walk, vertex, light, event);

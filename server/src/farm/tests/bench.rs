@@ -7,6 +7,7 @@ use crate::{
 };
 use bytes::Bytes;
 use ovtigre_core::film::{
+    allocation::Allocation,
     batch::Batch,
     exr::{PartialAttributes, read_layers, write_partial},
     invalid::InvalidSamples,
@@ -249,6 +250,7 @@ pub(crate) fn partial(lease: &Lease, sum: &Sum) -> Bytes {
         scene: lease.scene.to_string(),
         method: lease.settings.method.name().to_owned(),
         solution: None,
+        allocation: lease.allocation.as_ref().map(Allocation::hash),
     };
     write_partial(sum, lease.settings.size, &attributes).into()
 }
@@ -289,5 +291,6 @@ pub(crate) fn sum(batch: Batch, spread: Spread) -> Sum {
         planes: vec![plane],
         invalid: InvalidSamples { negative: 1, ..InvalidSamples::default() },
         rays,
+        tile_rays: Vec::new(),
     }
 }

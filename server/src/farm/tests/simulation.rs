@@ -161,6 +161,7 @@ fn sum(schedule: &Schedule, job: usize, batch: BatchKey) -> Sum {
         planes: vec![vec![[value; 3]; of.region.pixels()]],
         invalid: InvalidSamples::default(),
         rays,
+        tile_rays: Vec::new(),
     }
 }
 

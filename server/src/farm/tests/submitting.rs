@@ -2,8 +2,12 @@
 
 use super::bench::{Bench, rules};
 use crate::farm::error::FarmError;
-use ovtigre_core::settings::CameraChoice;
-use ovtigre_proto::{job::JobRequest, pair::EnvironmentRequest, problem::Fault};
+use ovtigre_core::settings::{CameraChoice, Distribution, Method};
+use ovtigre_proto::{
+    job::{JobRequest, MethodRequest},
+    pair::EnvironmentRequest,
+    problem::Fault,
+};
 
 #[tokio::test]
 async fn every_default_is_resolved() {
@@ -20,6 +24,24 @@ async fn every_default_is_resolved() {
     assert_eq!((spec.samples_asked(), spec.settings.replicates), (1, 1));
     let spec = check(JobRequest { samples: Some(10), ..JobRequest::default() }).await.unwrap();
     assert_eq!((spec.samples_asked(), spec.warnings.len()), (8, 1), "at most 10, and it is said");
+}
+
+const ADAPTIVE: Option<Distribution> = Some(Distribution::Adaptive);
+
+#[tokio::test]
+async fn too_few_samples_are_not_allocated_and_enough_are_by_a_method_that_can() {
+    let bench = Bench::new(rules()).await;
+    let scene = Some(bench.scene().await);
+    let of =
+        |samples| JobRequest { scene: scene.clone(), samples, sampling: ADAPTIVE, ..JobRequest::default() };
+    let spec = bench.farm.check(of(Some(124))).await.unwrap();
+    assert_eq!((spec.settings.sampling, spec.decided_after), (Distribution::Uniform, None));
+    assert!(spec.warnings.iter().any(|warning| warning.contains("needs 128")), "{:?}", spec.warnings);
+    let spec = bench.farm.check(of(Some(128))).await.unwrap();
+    assert_eq!((spec.settings.sampling, spec.settings.method), (Distribution::Adaptive, Method::Path));
+    let after = spec.decided_after.unwrap() as usize;
+    assert_eq!(spec.schedule().samples_after(after), 16);
+    assert!(spec.warnings.is_empty(), "{:?}", spec.warnings);
 }
 
 type Change<'a> = Box<dyn Fn(&mut JobRequest) + 'a>;
@@ -55,6 +77,9 @@ async fn a_request_that_cannot_be_followed_is_refused_where_it_is_wrong() {
         ("/layers/0", Box::new(|r| r.layers = vec!["a\u{1b}=LE".to_owned()])),
         ("/weight", Box::new(|r| r.weight = Some(0))),
         ("/max_workers", Box::new(|r| r.max_workers = Some(0))),
+        ("/sampling", Box::new(|r| (r.sampling, r.method) = (ADAPTIVE, Some(MethodRequest::Light)))),
+        ("/sampling", Box::new(|r| (r.sampling, r.method) = (ADAPTIVE, Some(MethodRequest::Bidirectional)))),
+        ("/replicates", Box::new(|r| (r.sampling, r.replicates) = (ADAPTIVE, Some(3)))),
         ("/tags/0", Box::new(|r| r.tags = vec![String::new()])),
     ];
     for (pointer, change) in cases {

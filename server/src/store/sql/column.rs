@@ -15,7 +15,8 @@ use std::{fmt::Display, str::FromStr, time::Duration};
 macro_rules! columns_of {
     (job) => {
         "sequence, id, name, scene, state, reason, version, priority, created_ms, started_ms, ended_ms, paused_ms, \
-         paused_since_ms, spec, progress, certified, manifest, settled, class"
+         paused_since_ms, spec, progress, certified, manifest, settled, class, error_ppb, part_ppb, expected_ms, \
+         workers"
     };
     (checkpoint) => {
         "look, samples, wall_seconds, worker_seconds, rays, rms_error, relative_error, relative_error_upper, \

@@ -8,8 +8,10 @@ use super::{
 };
 use crate::store::{
     error::Result,
+    list::billionths,
     row::{BatchKey, Brought, CommitRow, Lane, Mandate, NewCheckpoint},
 };
+use ovtigre_core::film::allocation::Allocations;
 use ovtigre_proto::{
     curve::{CurveRow, LayerError},
     id::{BlobId, JobId},
@@ -67,7 +69,7 @@ pub(super) async fn add_checkpoint(
     new: NewCheckpoint,
 ) -> Result<()> {
     require(db, job, mandate).await?;
-    let NewCheckpoint { look, row, layers, progress } = new;
+    let NewCheckpoint { look, row, layers, progress, allocations } = new;
     let insert = query(
         "INSERT INTO checkpoint (job, look, samples, wall_seconds, worker_seconds, rays,
                                  rms_error, relative_error, relative_error_upper, layers,
@@ -81,8 +83,14 @@ pub(super) async fn add_checkpoint(
         insert.bind(row.target_expected_at_seconds).bind(row.doubt.as_ref().map(to_json).transpose()?);
     if db.execute(insert).await? > 0 {
         let progress = to_json(&progress)?;
-        let set = query("UPDATE job SET progress = $2, looks = $3 WHERE id = $1");
-        db.execute(set.bind(job.as_str()).bind(progress).bind(look)).await?;
+        let set = query("UPDATE job SET progress = $2, looks = $3, error_ppb = $4 WHERE id = $1");
+        let set = set.bind(job.as_str()).bind(progress).bind(look);
+        db.execute(set.bind(billionths(row.relative_error))).await?;
+    }
+    if let Some(allocations) = allocations {
+        let insert =
+            query("INSERT INTO allocation (job, allocations) VALUES ($1, $2) ON CONFLICT DO NOTHING");
+        db.execute(insert.bind(job.as_str()).bind(to_json(&allocations)?)).await?;
     }
     Ok(())
 }
@@ -92,6 +100,12 @@ pub(super) async fn layers(db: &mut Db, job: &JobId) -> Result<Vec<LayerError>> 
     let latest = query("SELECT layers FROM checkpoint WHERE job = $1 ORDER BY look DESC LIMIT 1");
     let row = db.first(latest.bind(job.as_str())).await?;
     row.map_or_else(|| Ok(Vec::new()), |row| from_json(&row, "layers"))
+}
+
+/// How a job's samples are allocated.
+pub(super) async fn allocations(db: &mut Db, job: &JobId) -> Result<Option<Allocations>> {
+    let row = query("SELECT allocations FROM allocation WHERE job = $1").bind(job.as_str());
+    db.first(row).await?.map(|row| from_json(&row, "allocations")).transpose()
 }
 
 /// A job's checkpoints in order.

@@ -8,6 +8,7 @@ use super::{
 };
 use crate::store::{
     error::{Result, StoreError},
+    list::billionths,
     row::{BatchKey, Extension, Lane, TokenRow},
 };
 use ovtigre_proto::id::{BlobId, JobId, WorkerId};
@@ -99,8 +100,13 @@ pub(super) async fn extend_job(db: &mut Db, id: &JobId, version: u64, to: Extens
     let looks = query("DELETE FROM checkpoint WHERE job = $1 AND look > $2").bind(id.as_str());
     db.execute(looks.bind(to.looks)).await?;
     free_merge(db, id).await?;
-    let told = query("UPDATE job SET version = version + 1, spec = $2, looks = $3 WHERE id = $1");
-    db.execute(told.bind(id.as_str()).bind(to.spec).bind(to.looks)).await?;
+    let latest = query("SELECT relative_error FROM checkpoint WHERE job = $1 ORDER BY look DESC LIMIT 1");
+    let latest = db.first(latest.bind(id.as_str())).await?;
+    let error = latest.map_or(Ok(None), |row| row.real_or_none("relative_error"))?;
+    let told =
+        query("UPDATE job SET version = version + 1, spec = $2, looks = $3, error_ppb = $4 WHERE id = $1");
+    let told = told.bind(id.as_str()).bind(to.spec).bind(to.looks);
+    db.execute(told.bind(billionths(error))).await?;
     Ok(true)
 }
 

@@ -79,6 +79,34 @@ pub(super) fn not_there(jobs: &[JobId]) -> Query {
     bound(statement, jobs.iter().map(|job| json!([job.as_str()])).collect())
 }
 
+/// Since when each of these jobs runs, in the order of the jobs; nothing where it does not.
+pub(super) fn of_run_times(jobs: &[JobId]) -> Query {
+    let statement = over!(
+        [0 job text],
+        "SELECT started_ms, paused_ms FROM item LEFT JOIN job ON job.id = item.job AND state = 'running' ORDER BY n"
+    );
+    bound(statement, jobs.iter().map(|job| json!([job.as_str()])).collect())
+}
+
+/// How far jobs are that are not settled, in billionths, and when they are expected to be done: `$2` where they do not run.
+pub(super) fn to_outlooks(jobs: Vec<(&JobId, i64, i64)>) -> Query {
+    let statement = over!(
+        [0 job text, 1 part whole, 2 expected whole],
+        "UPDATE job SET part_ppb = item.part, expected_ms = CASE WHEN state = 'running' THEN item.expected ELSE $2 END
+         FROM item WHERE job.id = item.job AND settled = 0"
+    );
+    bound(statement, jobs.into_iter().map(|(job, part, at)| json!([job.as_str(), part, at])).collect())
+}
+
+/// How many workers jobs have.
+pub(super) fn to_workers(jobs: Vec<(String, i64)>) -> Query {
+    let statement = over!(
+        [0 job text, 1 count whole],
+        "UPDATE job SET workers = item.count FROM item WHERE job.id = item.job"
+    );
+    bound(statement, jobs.into_iter().map(|(job, count)| json!([job, count])).collect())
+}
+
 /// What is known of a batch before it is handed out.
 struct Claimable {
     state: Option<String>,

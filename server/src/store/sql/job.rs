@@ -10,6 +10,7 @@ use super::{
 };
 use crate::store::{
     error::Result,
+    list::{NEVER, Ranks, billionths},
     row::{Added, IdempotencyKey, JobChange, JobHead, JobRow, NewJob, Progress, Settlement},
 };
 use ovtigre_proto::{id::JobId, status::JobState};
@@ -126,6 +127,12 @@ pub(super) fn read(row: &Row, now: i64) -> Result<JobRow> {
         manifest: row.text_or_none("manifest")?,
         settled: row.truth("settled")?,
         class: row.text_or_none("class")?,
+        ranks: Ranks {
+            error_ppb: row.whole("error_ppb")?,
+            part_ppb: row.whole("part_ppb")?,
+            expected_ms: row.whole("expected_ms")?,
+            workers: row.whole("workers")?,
+        },
     })
 }
 
@@ -157,19 +164,24 @@ async fn set_state(db: &mut Db, id: &JobId, state: JobState, now: i64) -> Result
                                          WHEN paused_since_ms > started_ms THEN $3 - paused_since_ms
                                          ELSE $3 - started_ms END,
             paused_since_ms = CASE WHEN $2 = 'paused' THEN $3 END,
-            ended_ms = CASE WHEN $4 = 1 THEN coalesce(ended_ms, $3) END
+            ended_ms = CASE WHEN $4 = 1 THEN coalesce(ended_ms, $3) END,
+            expected_ms = $5, workers = CASE WHEN $4 = 1 THEN 0 ELSE workers END
          WHERE id = $1",
     );
-    db.execute(set.bind(id.as_str()).bind(state.name()).bind(now).bind(state.is_over())).await?;
+    let set = set.bind(id.as_str()).bind(state.name()).bind(now).bind(state.is_over());
+    db.execute(set.bind(NEVER)).await?;
     if state.is_over() { forget(db, id, Kept::Commits).await } else { Ok(()) }
 }
 
 /// The job has its last form: nobody asks any more who brought what.
 async fn settle(db: &mut Db, id: &JobId, settlement: Settlement) -> Result<()> {
-    let Settlement { mandate, progress, manifest, certified } = settlement;
+    let Settlement { mandate, progress, part, manifest, certified } = settlement;
     require(db, id, mandate).await?;
-    let set = query("UPDATE job SET settled = 1, progress = $2, manifest = $3, certified = $4 WHERE id = $1");
-    db.execute(set.bind(id.as_str()).bind(to_json(&progress)?).bind(manifest).bind(certified)).await?;
+    let set = query(
+        "UPDATE job SET settled = 1, progress = $2, manifest = $3, certified = $4, part_ppb = $5 WHERE id = $1",
+    );
+    let set = set.bind(id.as_str()).bind(to_json(&progress)?).bind(manifest).bind(certified);
+    db.execute(set.bind(billionths(Some(part)))).await?;
     forget(db, id, Kept::Curve).await
 }
 
@@ -201,6 +213,7 @@ async fn forget(db: &mut Db, id: &JobId, kept: Kept) -> Result<()> {
         "DELETE FROM snapshot WHERE job = $1",
         "DELETE FROM commits WHERE job = $1",
         "DELETE FROM checkpoint WHERE job = $1",
+        "DELETE FROM allocation WHERE job = $1",
         "DELETE FROM idempotency WHERE job = $1",
         "DELETE FROM notice WHERE job = $1",
         "DELETE FROM webhook WHERE job = $1",

@@ -104,6 +104,10 @@ fn statement(key: Key, way: Way, which: (Option<&Place>, Option<JobState>)) -> Q
         }
         Key::State => either_way!(way, ordered!("state", "state", ...), which),
         Key::Priority => either_way!(way, ordered!("priority", "priority", ...), which),
+        Key::Error => either_way!(way, ordered!("error_ppb", "error_ppb", ...), which),
+        Key::Progress => either_way!(way, ordered!("part_ppb", "part_ppb", ...), which),
+        Key::Eta => either_way!(way, ordered!("expected_ms", "expected_ms", ...), which),
+        Key::Workers => either_way!(way, ordered!("workers", "workers", ...), which),
     }
 }
 

@@ -16,6 +16,7 @@ mod merger;
 mod notice;
 mod open;
 mod query;
+mod ranks;
 #[cfg(test)]
 pub(crate) mod schema;
 mod worker;
@@ -25,7 +26,7 @@ use super::{
     Sharing, Store,
     error::{Result, StoreError},
     kept::{KeptJob, UnfiledJob},
-    list::{JobFilter, Standing},
+    list::{JobFilter, Outlook, Standing},
     notice::NoticeRow,
     row::{
         Added, BatchKey, Brought, Claim, CommitOutcome, CommitRow, Counts, Extension, IdempotencyKey,
@@ -35,6 +36,7 @@ use super::{
 };
 use connection::Db;
 use open::{Readers, Source};
+use ovtigre_core::film::allocation::Allocations;
 use ovtigre_proto::{
     curve::{CurveRow, LayerError},
     id::{BlobId, JobId, LeaseId, WorkerId},
@@ -172,6 +174,25 @@ impl Store for Sql {
         list::standings(&mut self.reader().await?, jobs).await
     }
 
+    async fn run_times(&self, jobs: &[JobId]) -> Result<Vec<Option<f64>>> {
+        ranks::run_times(&mut self.reader().await?, jobs).await
+    }
+
+    async fn look_out(&self, outlooks: Vec<Outlook>) -> Result<()> {
+        if outlooks.is_empty() {
+            return Ok(());
+        }
+        self.writer.write(|db| Box::pin(ranks::look_out(db, outlooks))).await
+    }
+
+    async fn count_workers(&self) -> Result<()> {
+        let counted = ranks::miscounted(&mut self.reader().await?).await?;
+        if counted.is_empty() {
+            return Ok(());
+        }
+        self.writer.write(|db| Box::pin(ranks::count_workers(db, counted))).await
+    }
+
     async fn unsettled_jobs(&self) -> Result<Vec<JobRow>> {
         job::unsettled(&mut self.reader().await?).await
     }
@@ -294,6 +315,10 @@ impl Store for Sql {
                 Box::pin(async move { commit::add_checkpoint(db, &job, mandate, checkpoint).await })
             })
             .await
+    }
+
+    async fn allocations(&self, job: &JobId) -> Result<Option<Allocations>> {
+        commit::allocations(&mut self.reader().await?, job).await
     }
 
     async fn layers(&self, job: &JobId) -> Result<Vec<LayerError>> {

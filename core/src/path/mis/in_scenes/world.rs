@@ -8,7 +8,7 @@ use crate::sampler::{Dimension, Sampler, Use};
 use crate::scene::Scene;
 use crate::scene::environment::Environment;
 use crate::scene::view::{LensInScene, Views};
-use crate::settings::{CameraChoice, FULL, Gloss, Method, Settings, Shadows, Shutter, Weights};
+use crate::settings::{CameraChoice, Distribution, FULL, Gloss, Method, Settings, Shadows, Shutter, Weights};
 use base64::Engine;
 use glam::{Vec2, Vec3};
 use serde_json::{Value, json};
@@ -205,5 +205,6 @@ pub(super) fn settings(weights: Weights) -> Settings {
         shadows: Shadows::On,
         seed: 0,
         replicates: 1,
+        sampling: Distribution::Uniform,
     }
 }
