@@ -143,22 +143,28 @@ export class Viewer {
       return;
     }
     this.#busy = true;
-    try {
-      do {
-        this.#again = false;
-        await this.#fetch(this.#a, this.#layer);
-        if (this.#against.startsWith('layer:')) await this.#fetch(this.#b, this.#against.slice(6));
-        if (this.#against === 'job:') await this.#fetch(this.#b, 'picture', this.#reference);
-      } while (this.#again && !this.#signal.aborted);
-    } catch (error) {
-      if (error.name === 'AbortError') return;
-      if (!(error instanceof Problem)) throw error;
-      text(this.message, error.message);
-      this.message.hidden = this.#a.canvas.width > 1;
-    } finally {
-      this.#busy = false;
-    }
+    do {
+      this.#again = false;
+      try {
+        await this.#fetchShown();
+      } catch (error) {
+        if (!(error instanceof Problem)) {
+          this.#busy = false;
+          if (error.name === 'AbortError') return;
+          throw error;
+        }
+        text(this.message, error.message);
+        this.message.hidden = this.#a.canvas.width > 1;
+      }
+    } while (this.#again && !this.#signal.aborted);
+    this.#busy = false;
     this.#place();
+  }
+
+  async #fetchShown() {
+    await this.#fetch(this.#a, this.#layer);
+    if (this.#against.startsWith('layer:')) await this.#fetch(this.#b, this.#against.slice(6));
+    if (this.#against === 'job:') await this.#fetch(this.#b, 'picture', this.#reference);
   }
 
   async #fetch(side, layer, job) {

@@ -1,5 +1,6 @@
 //! Measures what method `auto` chooses against every fixed method, and prints the tables of docs/PERFORMANCE.md:
-//! `cargo run --release -p ovtigre-tests --bin auto -- [--scene NAME] [--jobs WIDTHxSAMPLES,…] [--seeds N]`.
+//! `cargo run --release -p ovtigre-tests --bin auto -- [--scene NAME] [--file SCENE.glb]… [--jobs WIDTHxSAMPLES,…] [--seeds N]`.
+//! Where files are given, only these are tried.
 //!
 //! Time is that of one thread on a processor, so that others on the machine count little; methods take turns.
 
@@ -37,7 +38,7 @@ use ovtigre_tests::{
     stage,
     thread_time::thread_seconds,
 };
-use std::{fmt::Write as _, io::Write as _};
+use std::{fmt::Write as _, io::Write as _, path::Path};
 
 const METHODS: [Method; 4] = [Method::Path, Method::Bidirectional, Method::Caustics, Method::Light];
 /// Of them, and of a job.
@@ -59,13 +60,14 @@ struct Job {
 
 struct Arguments {
     scene: Option<String>,
+    files: Vec<(String, Vec<u8>)>,
     jobs: Vec<Job>,
     seeds: u64,
 }
 
 fn main() -> anyhow::Result<()> {
     let jobs = vec![Job { width: 480, samples: 256 }];
-    let mut asked = Arguments { scene: None, jobs, seeds: 8 };
+    let mut asked = Arguments { scene: None, files: Vec::new(), jobs, seeds: 8 };
     let mut arguments = std::env::args().skip(1);
     while let Some(flag) = arguments.next() {
         let value = arguments.next().with_context(|| format!("{flag} needs a value"))?;
@@ -73,11 +75,30 @@ fn main() -> anyhow::Result<()> {
             "--seeds" => asked.seeds = value.parse()?,
             "--jobs" => asked.jobs = value.split(',').map(job).collect::<anyhow::Result<_>>()?,
             "--scene" => asked.scene = Some(value),
+            "--file" => asked.files.push(read(&value)?),
             _ => bail!("{flag} is no flag"),
         }
     }
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
-    let scenes: [(&str, Vec<u8>); 9] = [
+    let ours = if asked.files.is_empty() { scenes() } else { Vec::new() };
+    for (name, glb) in ours.iter().chain(&asked.files) {
+        if asked.scene.as_ref().is_none_or(|scene| scene == name) {
+            let tables = pool.install(|| compare(name, glb, &asked))?;
+            writeln!(std::io::stdout(), "{tables}")?;
+        }
+    }
+    Ok(())
+}
+
+/// A scene in one file, by the file's name.
+fn read(path: &str) -> anyhow::Result<(String, Vec<u8>)> {
+    let name = Path::new(path).file_stem().context("--file needs a file")?;
+    Ok((name.to_string_lossy().into_owned(), std::fs::read(path).with_context(|| path.to_owned())?))
+}
+
+/// The scenes of the repository.
+fn scenes() -> Vec<(String, Vec<u8>)> {
+    let scenes = [
         ("room", room()),
         ("cornell", cornell()),
         ("two-rooms", two_rooms()),
@@ -88,11 +109,7 @@ fn main() -> anyhow::Result<()> {
         ("rough-glass", matrix::ball_of_glass(0.5).glb),
         ("under-sky", under_sky()),
     ];
-    for (name, glb) in scenes.iter().filter(|(name, _)| asked.scene.as_deref().is_none_or(|s| s == *name)) {
-        let tables = pool.install(|| compare(name, glb, &asked))?;
-        writeln!(std::io::stdout(), "{tables}")?;
-    }
-    Ok(())
+    scenes.into_iter().map(|(name, glb)| (name.to_owned(), glb)).collect()
 }
 
 /// Plastic and metal without a lamp, so that there is a sky.
