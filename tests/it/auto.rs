@@ -1,15 +1,26 @@
 //! Which method is chosen where none is asked for.
 
+use glam::Vec3;
 use ovtigre_core::{
-    render::pilot::{Chance, NoPilot, Pilot, Plan, pilot},
-    settings::Method,
+    film::{
+        batch::{Batch, Block},
+        sum::Plane,
+    },
+    render::{
+        batch::render,
+        pilot::{Chance, NoPilot, Pilot, Plan, pilot},
+        progress::Progress,
+    },
+    settings::{Layer, Method, Settings, Shows, Strategy},
 };
 use ovtigre_tests::{
-    picture::settings,
+    glb::Glb,
+    picture::{scene, settings},
     program::{Farm, run},
-    scenes::{cornell, two_rooms},
+    scenes::{add, cornell, flipped, floor, glass, lambert, sphere, two_rooms},
     showcase::{caustic, lamp_behind_glass},
 };
+use rayon::prelude::*;
 use serde_json::Value;
 use std::{fs, path::Path};
 
@@ -54,6 +65,46 @@ fn what_is_not_tried_looks_for_light_that_is_met_by_chance() {
     assert_eq!(small(Chance::Sometimes, &THREE).untried(), Method::Caustics);
     assert_eq!(small(Chance::Sometimes, &THREE[..2]).untried(), Method::Path);
     assert_eq!(small(Chance::Never, &ALL).untried(), Method::Path);
+}
+
+/// A glass ball between a floor and a lamp so large that eye subpaths meet it by chance now and then.
+fn under_a_large_lamp() -> Vec<u8> {
+    let mut glb = Glb::new();
+    add(&mut glb, "floor", lambert(0.7, 0.0), floor(0.0, 4.0, 0.0, 0.0));
+    add(&mut glb, "ball", glass(1.5), sphere(Vec3::new(0.0, 0.7, 0.0), 0.5, 24));
+    add(&mut glb, "lamp", lambert(0.0, 2.0), flipped(floor(2.5, 1.6, -0.5, 0.0)));
+    glb.perspective(Vec3::new(0.0, 2.2, 3.6), Vec3::new(0.3, 0.2, 0.0), 36.0);
+    glb.finish()
+}
+
+/// With weights w of techniques that add up to one, E\[f²/p²\] over the eye's paths is the mean of w f²/p² over them and of
+/// w' f²/(p p') over those of the light.
+#[test]
+fn light_subpaths_tell_what_the_squares_of_path_are() {
+    const ROUNDS: u32 = 1000;
+    let settings = Settings { paths: "LSSDE".to_owned(), ..settings(24, 16, ROUNDS) };
+    let layer = |shows| Layer { name: format!("{shows}"), shows };
+    let layers = vec![layer(Shows::Strategy(Strategy { s: 0, t: 5 })), layer(Shows::Chance)];
+    let caustics = Settings { method: Method::Caustics, layers, ..settings.clone() };
+    let scene = scene(&under_a_large_lamp(), &settings);
+    let squares = |replicate: u32| {
+        let block = Block { index: 0, start: 0, count: 1 };
+        let batch = Batch { region: settings.size.frame(), replicate, block };
+        let [path, caustics] =
+            [&settings, &caustics].map(|by| render(&scene, by, batch, &Progress::new()).unwrap().planes);
+        let channels =
+            |plane: &Plane| -> Vec<f64> { plane.iter().flatten().map(|c| f64::from(*c)).collect() };
+        let (whole, weighted, told) = (channels(&path[0]), channels(&caustics[1]), channels(&caustics[2]));
+        let met = whole.iter().map(|x| x * x).sum::<f64>();
+        [met, met - whole.iter().zip(weighted).map(|(x, wx)| x * wx).sum::<f64>(), told.iter().sum::<f64>()]
+    };
+    let all: Vec<[f64; 3]> = (0..ROUNDS).into_par_iter().map(squares).collect();
+    let mean = |of: &dyn Fn(&[f64; 3]) -> f64| all.iter().map(of).sum::<f64>() / all.len() as f64;
+    let [met, rest, told] = [0, 1, 2].map(|i| mean(&|one| one[i]));
+    let variance = mean(&|one| (one[1] - one[2] - rest + told).powi(2)) / f64::from(ROUNDS);
+    let sigma = variance.sqrt();
+    assert!(sigma < 0.03 * told && told > 0.3 * met, "{met} {rest} {told} ± {sigma}");
+    assert!((rest - told).abs() < 4.0 * sigma, "{rest} {told} ± {sigma}");
 }
 
 #[test]

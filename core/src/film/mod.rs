@@ -5,6 +5,7 @@ pub mod allocation;
 pub mod append;
 pub mod batch;
 pub mod certificate;
+pub mod chance;
 pub mod compare;
 pub mod develop;
 pub mod error;

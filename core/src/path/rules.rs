@@ -45,6 +45,7 @@ pub struct Rules {
     /// The plane of each technique that has one.
     technique_planes: Vec<(Technique, usize)>,
     narrow_plane: Option<usize>,
+    chance_plane: Option<usize>,
     /// What a material does to light, by its number; `None` where textures tell.
     even: Vec<Option<Bsdf>>,
     /// The solids around the eye, where all its rays start at one point.
@@ -71,7 +72,8 @@ impl Rules {
     /// From the settings of a picture of `pixels` pixels.
     pub fn new(scene: &Scene, settings: &Settings, pixels: usize) -> Result<Self, ExpressionError> {
         let mut expressions = vec![settings.paths.as_str()];
-        let (mut rule_planes, mut technique_planes, mut narrow_plane) = (vec![0], Vec::new(), None);
+        let (mut rule_planes, mut technique_planes) = (vec![0], Vec::new());
+        let (mut narrow_plane, mut chance_plane) = (None, None);
         for (i, layer) in settings.layers.iter().enumerate() {
             match &layer.shows {
                 Shows::Paths(paths) => {
@@ -82,6 +84,7 @@ impl Rules {
                     technique_planes.push(((*s as usize, *t as usize), i + 1));
                 }
                 Shows::Narrow => narrow_plane = Some(i + 1),
+                Shows::Chance => chance_plane = Some(i + 1),
             }
         }
         let language = Language::compile(&expressions)?;
@@ -101,6 +104,7 @@ impl Rules {
             rule_planes,
             technique_planes,
             narrow_plane,
+            chance_plane,
             media_of_eye: scene.eye().map(|eye| Media::around(scene, eye, Moment::STILL, &mut 0)),
         })
     }
@@ -118,12 +122,18 @@ impl Rules {
 
     /// Number of pictures.
     pub fn planes(&self) -> usize {
-        self.rule_planes.len() + self.technique_planes.len() + usize::from(self.narrow_plane.is_some())
+        let further = [self.narrow_plane, self.chance_plane];
+        self.rule_planes.len() + self.technique_planes.len() + further.iter().flatten().count()
     }
 
     /// The plane that shows the picture with half the area of gathering.
     pub fn narrow_plane(&self) -> Option<usize> {
         self.narrow_plane
+    }
+
+    /// The plane of squares of what `path` meets by chance.
+    pub fn chance_plane(&self) -> Option<usize> {
+        self.chance_plane
     }
 
     /// Whether every path counts, for one picture.

@@ -5,6 +5,7 @@
 use crate::film::append::Prefix;
 use crate::film::batch::{Batch, Block};
 use crate::film::certificate::Look;
+use crate::film::chance::square_by_chance;
 use crate::film::error::estimate;
 use crate::film::estimate::picture;
 use crate::film::missed::missed;
@@ -13,7 +14,7 @@ use crate::film::sketch::Sketch;
 use crate::render::batch::{RenderError, render};
 use crate::render::prepare::{PrepareError, Prepared, prepare};
 use crate::render::progress::Progress;
-use crate::settings::{Method, Settings};
+use crate::settings::{Layer, Method, Settings, Shows};
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -28,8 +29,6 @@ const BLOCKS_MAX: u32 = 4;
 /// Fewest pixels of a pilot's pictures: with 120 of them and a sample by each sequence, what was taken was worse on average than what is
 /// taken untried.
 const PIXELS_MIN: f64 = 192.0;
-/// Fewer pixels than these tell little.
-const PIXELS_FEW: usize = 2000;
 /// Most pixels of a pilot's pictures. They should be as small as the job's: edges are noise that all methods share, and there is
 /// the more of it the larger pixels are, which speaks for the method with the cheapest samples.
 const PIXELS_MAX: f64 = 3600.0;
@@ -43,14 +42,9 @@ const TRIANGLES_MAX: u64 = 1 << 20;
 const PATH_RAYS_MAX: f64 = 64.0;
 /// Work of a pilot, at most, in microseconds of a thread: one who submits a job waits for it, and sees its picture first.
 const WORK_MAX: f64 = 1.25e6;
-/// Another method than the one that is taken untried is taken where it needs less than so many times its work.
-const GAIN: f64 = 0.95;
-/// The same by few pixels where that is `path` and misses nothing: by single samples it seems worse than it is, as its error falls the
-/// fastest with more of them.
-const GAIN_BY_FEW: f64 = 0.85;
-/// What the first method's work counts where it meets light by chance: what few samples tell of its error is mostly too little. In the
-/// bundled room and in a caustic, pilots said 1.5 and 1.6 times the work of the best, and long renders 4 and 200.
-const BY_CHANCE: f64 = 2.0;
+/// What the work of `path` counts: in a pilot it seems more than in a job, as with more samples of a sequence its error falls faster than
+/// that of methods whose light subpaths go anywhere.
+const SEQUENCE: f64 = 0.8;
 
 /// How eye subpaths come to light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -168,6 +162,9 @@ pub struct Trial {
     pub square_error: f64,
     /// Relative error by light that another method has met and this one has not.
     pub missed: f64,
+    /// Relative error of `path` by light that light subpaths bring to the lens more often than it meets it, as these tell.
+    #[serde(default)]
+    pub by_chance: f64,
     /// Work for the same error, over that of the method that is taken.
     pub time_ratio: f64,
 }
@@ -175,26 +172,19 @@ pub struct Trial {
 impl Trial {
     /// The work for an error is in proportion to it.
     fn cost(&self) -> f64 {
-        let square = self.relative_error * self.relative_error + self.missed * self.missed;
-        let cost = square * self.work;
+        let errors = [self.relative_error, self.missed, self.by_chance];
+        let work = match self.method {
+            Method::Path => SEQUENCE * self.work,
+            _ => self.work,
+        };
+        let cost = errors.map(|error| error * error).iter().sum::<f64>() * work;
         if cost.is_finite() { cost } else { f64::MAX }
     }
 }
 
-/// The trial to go by, in pictures of so many pixels: that of the method that is taken untried, where no other is good enough.
-fn chosen<'t>(trials: &'t [Trial], plan: &Plan, pixels: usize) -> &'t Trial {
-    let untried = plan.untried();
-    let gain = match plan.chance {
-        Chance::Never if pixels < PIXELS_FEW => GAIN_BY_FEW,
-        _ => GAIN,
-    };
-    let counts = |trial: &Trial| {
-        let by_chance = plan.chance == Chance::Sometimes && trial.method == plan.methods[0];
-        let chance = if by_chance { BY_CHANCE } else { 1.0 };
-        let gain = if trial.method == untried { gain } else { 1.0 };
-        chance * gain * trial.cost()
-    };
-    let least = trials.iter().min_by(|a, b| counts(a).total_cmp(&counts(b)));
+/// The trial to go by: the first of those that need the least work.
+fn chosen(trials: &[Trial]) -> &Trial {
+    let least = trials.iter().min_by(|a, b| a.cost().total_cmp(&b.cost()));
     least.expect("each method of a plan was tried")
 }
 
@@ -230,8 +220,13 @@ pub fn pilot(
     let prepared = prepare(bytes, environment, &settings)?;
     let mut trying = Trying { prepared: &prepared, region, plan, all: Vec::new() };
     for method in &plan.methods {
-        let lanes = (0..REPLICATES).map(|r| Prefix::empty(region, r, settings.layers.len() + 1));
-        trying.all.push((Settings { method: *method, ..settings.clone() }, lanes.collect()));
+        let mut settings = Settings { method: *method, ..settings.clone() };
+        if *method == Method::Caustics {
+            settings.layers.push(Layer { name: "by chance".to_owned(), shows: Shows::Chance });
+        }
+        let planes = settings.layers.len() + 1;
+        let lanes = (0..REPLICATES).map(|r| Prefix::empty(region, r, planes));
+        trying.all.push((settings, lanes.collect()));
     }
     trying.run(job)?;
     let pilot = trying.finish(settings.size, job);
@@ -337,20 +332,36 @@ impl Trying<'_> {
     }
 
     fn trials(&self) -> Vec<Trial> {
-        let trial = |(method, (settings, lanes)): (usize, &(Settings, Vec<Prefix>))| {
-            let others = self.all.iter().filter(|(other, _)| other.method != settings.method);
-            Trial {
-                method: settings.method,
-                samples: lanes.iter().map(Prefix::samples).sum(),
-                rays: self.rays(method),
-                work: self.work(method),
-                relative_error: square_of(self.region, lanes).sqrt(),
-                square_error: square_error(self.region, lanes),
-                missed: others.map(|(_, other)| missed(lanes, other)).fold(0.0, f64::max),
-                time_ratio: 1.0,
-            }
+        let trial = |(method, (settings, lanes)): (usize, &(Settings, Vec<Prefix>))| Trial {
+            method: settings.method,
+            samples: lanes.iter().map(Prefix::samples).sum(),
+            rays: self.rays(method),
+            work: self.work(method),
+            relative_error: square_of(self.region, lanes).sqrt(),
+            square_error: square_error(self.region, lanes),
+            missed: self.missed(settings.method, lanes),
+            by_chance: self.by_chance(settings.method, lanes),
+            time_ratio: 1.0,
         };
         self.all.iter().enumerate().map(trial).collect()
+    }
+
+    /// Relative error of the replicates of a method by light that another one has met.
+    fn missed(&self, method: Method, lanes: &[Prefix]) -> f64 {
+        let others = self.all.iter().filter(|(other, _)| other.method != method);
+        others.map(|(_, other)| missed(lanes, other)).fold(0.0, f64::max)
+    }
+
+    /// What `caustics` tells of the relative error of the replicates of `path`.
+    fn by_chance(&self, method: Method, lanes: &[Prefix]) -> f64 {
+        let teller = self.all.iter().find(|(settings, _)| settings.method == Method::Caustics);
+        match (method, teller) {
+            (Method::Path, Some((settings, told))) => {
+                let samples = lanes.iter().map(|lane| f64::from(lane.samples())).sum();
+                square_by_chance(told, settings.layers.len(), samples).sqrt()
+            }
+            _ => 0.0,
+        }
     }
 
     /// The picture by a method that was tried, of the region only.
@@ -369,7 +380,7 @@ impl Trying<'_> {
         let share = (self.spent() / self.job_work(job)).min(f64::MAX);
         let trials = self.trials();
         let (method, least) = {
-            let chosen = chosen(&trials, self.plan, self.region.pixels());
+            let chosen = chosen(&trials);
             (chosen.method, chosen.cost())
         };
         let mut pilot = Pilot { method, size, trials, share };

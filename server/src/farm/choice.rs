@@ -121,7 +121,7 @@ impl Farm {
 fn asked(settings: &Settings) -> Letters {
     let layers = settings.layers.iter().filter_map(|layer| match &layer.shows {
         Shows::Paths(paths) => Some(paths.as_str()),
-        Shows::Strategy(_) | Shows::Narrow => None,
+        Shows::Strategy(_) | Shows::Narrow | Shows::Chance => None,
     });
     let paths: Vec<&str> = iter::once(settings.paths.as_str()).chain(layers).collect();
     Language::compile(&paths).map_or(Letters::NONE, |language| language.letters())
@@ -165,13 +165,7 @@ fn reason(pilot: &Pilot) -> String {
         })
         .collect();
     let others = others.join(", ");
-    if pilot.trials.iter().any(|trial| trial.time_ratio < 1.0) {
-        format!(
-            "it misses no light behind glossy surfaces, for about the same time as others in a pilot: {others} of its"
-        )
-    } else {
-        format!("it needs the least time for an error in a pilot: {others} of its")
-    }
+    format!("it needs the least time for an error in a pilot: {others} of its")
 }
 
 #[cfg(test)]

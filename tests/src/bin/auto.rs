@@ -1,6 +1,6 @@
 //! Measures what method `auto` chooses against every fixed method, and prints the tables of docs/PERFORMANCE.md:
-//! `cargo run --release -p ovtigre-tests --bin auto -- [--scene NAME] [--file SCENE.glb]… [--jobs WIDTHxSAMPLES,…] [--seeds N]`.
-//! Where files are given, only these are tried.
+//! `cargo run --release -p ovtigre-tests --bin auto -- [--scene NAME] [--file SCENE.glb]… [--jobs WIDTHxSAMPLES,…] [--seeds N] [--runs N]`.
+//! Where files are given, only these are tried. True errors are over so many runs: one may happen not to meet what others do.
 //!
 //! Time is that of one thread on a processor, so that others on the machine count little; methods take turns.
 
@@ -63,16 +63,18 @@ struct Arguments {
     files: Vec<(String, Vec<u8>)>,
     jobs: Vec<Job>,
     seeds: u64,
+    runs: u64,
 }
 
 fn main() -> anyhow::Result<()> {
     let jobs = vec![Job { width: 480, samples: 256 }];
-    let mut asked = Arguments { scene: None, files: Vec::new(), jobs, seeds: 8 };
+    let mut asked = Arguments { scene: None, files: Vec::new(), jobs, seeds: 8, runs: 1 };
     let mut arguments = std::env::args().skip(1);
     while let Some(flag) = arguments.next() {
         let value = arguments.next().with_context(|| format!("{flag} needs a value"))?;
         match flag.as_str() {
             "--seeds" => asked.seeds = value.parse()?,
+            "--runs" => asked.runs = value.parse()?,
             "--jobs" => asked.jobs = value.split(',').map(job).collect::<anyhow::Result<_>>()?,
             "--scene" => asked.scene = Some(value),
             "--file" => asked.files.push(read(&value)?),
@@ -197,21 +199,42 @@ fn reference(prepared: &Prepared, settings: &Settings, samples: u32) -> Referenc
     Reference::of_picture(&reference.picture())
 }
 
-/// Every method, in about the time of so many samples by `path`: how the error falls with more of them differs.
-fn measure(prepared: &Prepared, settings: &Settings, samples: u32, reference: &Reference) -> Vec<Measured> {
-    let mut all: Vec<Measured> = METHODS.map(|method| Measured::new(method, settings)).into();
-    let once: Vec<f64> = all.iter().map(|one| one.once(prepared)).collect();
-    for (one, seconds) in all.iter_mut().zip(&once) {
-        let by_path = f64::from(samples / REPLICATES_OF_A_JOB);
-        one.samples = (by_path * once[0] / seconds).log2().round().exp2().max(1.0) as u32;
-    }
-    for replicate in 0..settings.replicates {
-        for one in &mut all {
-            one.take_turn(prepared, replicate);
+/// Every method, in about the time of so many samples by `path`: how the error falls with more of them differs. Errors are root mean
+/// squares over the runs.
+fn measure(
+    prepared: &Prepared,
+    settings: &Settings,
+    samples: u32,
+    (reference, runs): (&Reference, u64),
+) -> Vec<Measured> {
+    let once = METHODS.map(|method| Measured::new(method, settings).once(prepared));
+    let by_path = f64::from(samples / REPLICATES_OF_A_JOB);
+    let sized = once.map(|seconds| (by_path * once[0] / seconds).log2().round().exp2().max(1.0) as u32);
+    let mut all: Vec<Measured> = Vec::new();
+    for run in 0..runs {
+        let settings = Settings { seed: settings.seed + run, ..settings.clone() };
+        let start = |(method, samples)| Measured { samples, ..Measured::new(method, &settings) };
+        let mut these: Vec<Measured> = METHODS.into_iter().zip(sized).map(start).collect();
+        for replicate in 0..settings.replicates {
+            for one in &mut these {
+                one.take_turn(prepared, replicate);
+            }
+        }
+        for one in &mut these {
+            one.error = reference.relative_error(&one.picture().planes[0]);
+        }
+        if run == 0 {
+            all = these;
+        } else {
+            for (one, other) in all.iter_mut().zip(these) {
+                one.seconds += other.seconds;
+                one.error = one.error.hypot(other.error);
+            }
         }
     }
     for one in &mut all {
-        one.error = reference.relative_error(&one.picture().planes[0]);
+        one.seconds /= runs as f64;
+        one.error /= (runs as f64).sqrt();
     }
     all
 }
@@ -250,7 +273,7 @@ fn compare(name: &str, glb: &[u8], asked: &Arguments) -> anyhow::Result<String> 
     for (i, job) in asked.jobs.iter().enumerate() {
         let tried: Vec<Tried> = (0..asked.seeds).map(|seed| Tried::new(glb, &plan(*job, seed))).collect();
         if i == 0 || asked.jobs[i - 1].samples != job.samples {
-            measured = measure(&prepared, &small, job.samples, &reference);
+            measured = measure(&prepared, &small, job.samples, (&reference, asked.runs));
         }
         let open: Vec<&Measured> = measured.iter().filter(|one| is_open(&one.method())).collect();
         let best = open.iter().map(|one| one.cost()).fold(f64::INFINITY, f64::min);
@@ -290,11 +313,12 @@ fn fixed(out: &mut String, measured: &[Measured], best: f64, tried: &Tried) -> a
         let by_pilot = trials.into_iter().find(|trial| trial.method == one.method());
         let by_pilot = by_pilot.map_or("–".to_owned(), |trial| {
             format!(
-                "{:.2} (error {:.3}, by its error {:.3}, missed {:.3})",
+                "{:.2} (error {:.3}, by its error {:.3}, missed {:.3}, by chance {:.3})",
                 trial.time_ratio,
                 trial.relative_error,
                 trial.square_error.sqrt(),
-                trial.missed
+                trial.missed,
+                trial.by_chance
             )
         });
         let rays: u64 = one.lanes.iter().map(Prefix::rays).sum();

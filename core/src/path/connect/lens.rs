@@ -46,9 +46,11 @@ pub fn to_lens<E: Throughput<EyeState>, L: Throughput<LightState>>(
     let importance = seen.pdf.over_area(squared, 1.0);
     let end = LensEnd::new(walk, vertex, &seen, squared, backward);
     let weight = weight(walk, &end, start, f64::from(vertex.reverse_pdf(seen.direction)));
-    let factor = passes * (weight * importance / rules.light_paths) as f32;
+    let share = importance / rules.light_paths;
     let eye = E::in_state(rules.language.eye_start(), Vec3::ONE);
+    let factor = passes * (weight * share) as f32;
     tally.deposit(rules, Receiver::Pixel(seen.pixel), technique, &eye, &light, factor);
+    tally.deposit_square(rules, seen.pixel, &eye, &light, (passes * share as f32, weight));
 }
 
 /// Densities of an edge to the lens.
