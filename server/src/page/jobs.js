@@ -86,6 +86,9 @@ class Thumbnail {
       fill(this.node, canvas);
     } catch (error) {
       if (!(error instanceof Problem) && error.name !== 'AbortError') throw error;
+      // What was not there yet is asked for again.
+      this.key = null;
+      this.loaded = null;
     }
   }
 }
