@@ -66,25 +66,21 @@ impl Farm {
             return Ok(Left::Nothing);
         }
         let mut left = Left::Nothing;
-        let mut surplus = 0;
-        if let Some(most) = bytes {
+        if bytes.is_some() {
             left = self.count_bytes().await?;
-            surplus = self.store.kept_bytes().await?.saturating_sub(most);
         }
         let jobs = self.store.kept_jobs(JOBS_A_LOOK).await?;
         let all = jobs.len() < JOBS_A_LOOK as usize;
-        for KeptJob { id, version, over, bytes } in jobs {
+        for KeptJob { id, version, over, with_later } in jobs {
             if self.stopping.is_cancelled() {
                 return Ok(Left::Nothing);
             }
             let reason = match time {
                 Some(time) if over > time => "it was kept as long as jobs are",
-                _ if surplus > 0 => "jobs that are over take up more than is kept",
+                _ if bytes.is_some_and(|most| with_later > most) => "jobs that are over take up more than is kept",
                 // Later ones are over for a shorter time, and fit.
                 _ => return Ok(left),
             };
-            // Whoever else removed it, or had it go on, has made room as well.
-            surplus = surplus.saturating_sub(bytes.unwrap_or(0));
             if self.store.remove_settled(&id, version).await? {
                 self.blobs.delete_all(&BlobFolder::Job(id.clone())).await?;
                 tracing::info!(job = %id, reason, "job removed");
@@ -97,9 +93,9 @@ impl Farm {
     async fn count_bytes(&self) -> Result<Left> {
         let jobs = self.store.uncounted_jobs(JOBS_A_LOOK).await?;
         let all = jobs.len() < JOBS_A_LOOK as usize;
-        let counted = |job: KeptJob| async move {
-            let bytes = self.blobs.bytes_of(&job.id).await?;
-            Ok::<_, super::error::FarmError>((job.id, job.version, bytes))
+        let counted = |(job, version)| async move {
+            let bytes = self.blobs.bytes_of(&job).await?;
+            Ok::<_, super::error::FarmError>((job, version, bytes))
         };
         let counted = futures::stream::iter(jobs).map(counted).buffer_unordered(COUNTED_AT_A_TIME);
         self.store.count_jobs(counted.try_collect().await?).await?;

@@ -12,8 +12,8 @@ pub struct KeptJob {
     pub version: u64,
     /// Since when it is over, by the store's clock.
     pub over: Duration,
-    /// Bytes of its files, where they were counted.
-    pub bytes: Option<u64>,
+    /// Bytes of its files and of those of all jobs over for less long, as far as they were counted.
+    pub with_later: u64,
 }
 
 /// A job of which it is not written down which files it needs: an earlier version took it.

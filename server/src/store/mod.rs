@@ -77,12 +77,10 @@ pub trait Store: Send + Sync + fmt::Debug {
     async fn file(&self, jobs: Vec<(JobId, Vec<BlobId>)>) -> Result<()>;
     /// Jobs that are settled, the longest over first, `most` of them at most.
     async fn kept_jobs(&self, most: u32) -> Result<Vec<KeptJob>>;
-    /// Those of them whose bytes were not counted.
-    async fn uncounted_jobs(&self, most: u32) -> Result<Vec<KeptJob>>;
+    /// Those of them whose bytes were not counted, as of that version.
+    async fn uncounted_jobs(&self, most: u32) -> Result<Vec<(JobId, u64)>>;
     /// The files of each of those jobs have so many bytes, as long as it keeps that version.
     async fn count_jobs(&self, jobs: Vec<(JobId, u64, u64)>) -> Result<()>;
-    /// Bytes of all that were counted.
-    async fn kept_bytes(&self) -> Result<u64>;
 
     /// Adds a job with a cursor at block 0 of each lane, unless `key` was used before or a file is not there.
     async fn add_job(&self, job: NewJob, key: Option<IdempotencyKey>) -> Result<Added>;

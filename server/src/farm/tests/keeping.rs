@@ -73,9 +73,14 @@ async fn jobs_that_take_up_too_much_go_the_longest_over_first() {
     ] {
         bench.rules.kept = Kept { time: None, bytes: Some(bytes) };
         bench = bench.crash().await;
-        assert_eq!(bench.farm.forget_old().await.unwrap(), Left::Nothing);
+        // The farm itself, and other servers, may look at the same moment: what fits stays all the same.
+        let looks = (0..8).map(|_| bench.farm.forget_old());
+        for left in futures::future::join_all(looks).await {
+            assert_eq!(left.unwrap(), Left::Nothing);
+        }
         assert_eq!(there(&bench).await, expected, "{bytes} of {sizes:?}");
-        assert!(bench.farm.store.kept_bytes().await.unwrap() <= bytes);
+        let kept = bench.farm.store.kept_jobs(1).await.unwrap();
+        assert!(kept.first().map_or(0, |job| job.with_later) <= bytes);
     }
 }
 

@@ -200,15 +200,18 @@ fn kept_job(row: &Row, now: i64) -> Result<KeptJob> {
         id: parse(row, "id")?,
         version: count(row, "version")?,
         over: since(row, "over_ms", now)?,
-        bytes: row.whole_or_none("bytes")?.map(|bytes| bytes.max(0) as u64),
+        with_later: count(row, "with_later")?,
     })
 }
 
-/// Jobs that are settled, the longest over first.
+/// Jobs that are settled, the longest over first. What the later ones take up is of the same moment as the list, so that
+/// nobody takes jobs that somebody else has just removed for ones that still take up room.
 pub(super) async fn jobs(db: &mut Db, most: u32) -> Result<Vec<KeptJob>> {
     let now = db.now().await?;
     let rows = query(
-        "SELECT id, job.version AS version, coalesce(ended_ms, created_ms) AS over_ms, bytes
+        "SELECT id, job.version AS version, coalesce(ended_ms, created_ms) AS over_ms,
+            CAST(sum(coalesce(bytes, 0)) OVER (ORDER BY ended_ms, sequence
+                ROWS BETWEEN CURRENT ROW AND UNBOUNDED FOLLOWING) AS BIGINT) AS with_later
          FROM job LEFT JOIN job_bytes ON job_bytes.job = job.id AND job_bytes.version = job.version
          WHERE settled = 1 ORDER BY ended_ms, sequence LIMIT $1",
     );
@@ -216,15 +219,14 @@ pub(super) async fn jobs(db: &mut Db, most: u32) -> Result<Vec<KeptJob>> {
 }
 
 /// Those of them whose bytes were not counted.
-pub(super) async fn uncounted(db: &mut Db, most: u32) -> Result<Vec<KeptJob>> {
-    let now = db.now().await?;
+pub(super) async fn uncounted(db: &mut Db, most: u32) -> Result<Vec<(JobId, u64)>> {
     let rows = query(
-        "SELECT id, version, coalesce(ended_ms, created_ms) AS over_ms, CAST(NULL AS BIGINT) AS bytes FROM job
+        "SELECT id, version FROM job
          WHERE settled = 1 AND NOT EXISTS
             (SELECT 1 FROM job_bytes WHERE job_bytes.job = job.id AND job_bytes.version = job.version)
          ORDER BY ended_ms, sequence LIMIT $1",
     );
-    db.all(rows.bind(most)).await?.iter().map(|row| kept_job(row, now)).collect()
+    db.all(rows.bind(most)).await?.iter().map(|row| Ok((parse(row, "id")?, count(row, "version")?))).collect()
 }
 
 /// The files of each job have so many bytes as of that version.
@@ -238,13 +240,4 @@ pub(super) async fn count_jobs(db: &mut Db, jobs: Vec<(JobId, u64, u64)>) -> Res
         db.execute(set.bind(job.as_str()).bind(version).bind(bytes)).await?;
     }
     Ok(())
-}
-
-/// Bytes of all jobs that are settled and were counted.
-pub(super) async fn bytes(db: &mut Db) -> Result<u64> {
-    let sum = query(
-        "SELECT CAST(coalesce(sum(bytes), 0) AS BIGINT) AS bytes FROM job
-         JOIN job_bytes ON job_bytes.job = job.id AND job_bytes.version = job.version WHERE settled = 1",
-    );
-    count(&db.one(sum).await?, "bytes")
 }

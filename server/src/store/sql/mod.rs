@@ -138,16 +138,12 @@ impl Store for Sql {
         kept::jobs(&mut self.reader().await?, most).await
     }
 
-    async fn uncounted_jobs(&self, most: u32) -> Result<Vec<KeptJob>> {
+    async fn uncounted_jobs(&self, most: u32) -> Result<Vec<(JobId, u64)>> {
         kept::uncounted(&mut self.reader().await?, most).await
     }
 
     async fn count_jobs(&self, jobs: Vec<(JobId, u64, u64)>) -> Result<()> {
         self.writer.write(move |db| Box::pin(kept::count_jobs(db, jobs))).await
-    }
-
-    async fn kept_bytes(&self) -> Result<u64> {
-        kept::bytes(&mut self.reader().await?).await
     }
 
     async fn add_job(&self, job: NewJob, key: Option<IdempotencyKey>) -> Result<Added> {
