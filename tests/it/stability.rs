@@ -12,7 +12,7 @@ const SHARE: f64 = 0.001;
 
 /// What is known to fail: case, trial, and between what the result lies, relative to the known answer (of bounds: what was
 /// found). Mended, it fails here.
-const KNOWN: [(&str, &str, [f64; 2]); 18] = [
+const KNOWN: [(&str, &str, [f64; 2]); 13] = [
     ("a lamp in a white room of metal of roughness 0.8", "path", [-0.2964, -0.1976]),
     ("10⁻⁵ m at the side of 10⁵ m", "*", [-1.0000, -0.9900]),
     ("walls in the same planes", "path", [0.1167, 0.1750]),
@@ -23,11 +23,6 @@ const KNOWN: [(&str, &str, [f64; 2]); 18] = [
     ("a sheet 1e-7 m over a floor", "bidirectional", [0.6032, 0.9048]),
     ("lamps of radiance 10⁻³⁰ and 10³⁰", "light, of 10⁻³⁰", [-1.0000, -0.9900]),
     ("a ball of index 100", "path", [-0.0209, -0.0140]),
-    ("a ball of index 1.0001, roughness 0.5", "path", [-0.0420, -0.0280]),
-    ("a ball of index 1.05, roughness 0.5", "path", [-0.0581, -0.0387]),
-    ("a ball of index 1.5, roughness 0.2", "path", [-0.0067, -0.0045]),
-    ("a ball of index 1.5, roughness 0.5", "path", [-0.0109, -0.0073]),
-    ("a ball of index 2.4, roughness 0.5", "path", [-0.0201, -0.0134]),
     ("a ball of index 100, roughness 0.5", "path", [-0.0925, -0.0617]),
     ("100 solids of glass in each other", "path", [-1.0219, -0.6812]),
     ("rough glass seen from both ends", "n = 2.4", [0.000_200, 0.000_201]),

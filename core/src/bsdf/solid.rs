@@ -49,8 +49,8 @@ impl Solid {
             if pair.wi.z > 0.0 { self.reflected(interface, &pair) } else { self.refracted(interface, &pair) };
         if let Some(between) = &self.between {
             let sides = [between.side(wo.z), between.side(wi.z)];
-            let missing_o = between.missing(sides[0], pair.wo, stretched[0]);
-            let missing_i = between.missing(sides[1], wi.with_z(wi.z.abs()), stretched[1]);
+            let missing_o = between.missing(sides[0], pair.wo.z);
+            let missing_i = between.missing(sides[1], wi.z.abs());
             let (rest, pdf_rest) = between.evaluate(sides, [missing_o, missing_i], wi.z.abs());
             glossy += rest;
             pdf += (pdf_rest - pdf) * missing_o;
@@ -108,7 +108,7 @@ impl Solid {
             None => self.draw_single(interface, above, eta, u_lobe, u)?,
             Some(between) => {
                 let side = between.side(wo.z);
-                let missing = between.missing(side, above, self.ggx.stretched(above));
+                let missing = between.missing(side, above.z);
                 match split(u_lobe, missing) {
                     Ok(rest) => between.draw(side, rest, u)?,
                     Err(rest) => self.draw_single(interface, above, eta, rest, u)?,

@@ -34,7 +34,7 @@ pub(super) struct SolidBetween {
 }
 
 impl SolidBetween {
-    /// `None` where the table does not reach, or the reflectance is not Fresnel's own, for which it is made.
+    /// `None` where the reflectance is not Fresnel's own, for which the table is made.
     pub(super) fn new(ggx: Ggx, interface: &Interface) -> Option<Self> {
         if !interface.is_plain() {
             return None;
@@ -44,7 +44,7 @@ impl SolidBetween {
         } else {
             (Side::Dense, 1.0 / interface.ior)
         };
-        let cell = Cell::of(ggx.alpha, ratio)?;
+        let cell = Cell::of(ggx.alpha, ratio);
         let alpha2 = ggx.alpha2;
         let ell = libm::log1pf(1.0 / alpha2);
         let means = [cell.mean(Side::Rare, ell), cell.mean(Side::Dense, ell)];
@@ -66,10 +66,10 @@ impl SolidBetween {
         if z > 0.0 { self.outside } else { self.outside.other() }
     }
 
-    /// M of a direction on a side, z > 0 whatever the side.
+    /// M of a direction on a side, by its cosine, which is positive on either.
     #[inline]
-    pub(super) fn missing(&self, side: Side, w: Vec3, stretched: f32) -> f32 {
-        self.cell.missing(side, w, stretched)
+    pub(super) fn missing(&self, side: Side, cos: f32) -> f32 {
+        self.cell.missing(side, cos)
     }
 
     /// Flux f · |cos θᵢ| and density for the sides, the M and the cosine of `wi`.

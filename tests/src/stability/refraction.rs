@@ -50,8 +50,10 @@ fn ball(ior: f32, roughness: f32) -> Case {
         name: format!("a ball of index {ior}{rough}"),
         stresses: "clear glass that must neither gain nor lose",
         known: "it cannot be seen in a uniform sky: 0.7".to_owned(),
-        note: if roughness > 0.0 {
-            "What rough glass scatters between its facets is brought back for indices from 1.1 to 3, less a margin of at most 0.9 % by which the table never gains; for other indices it is lost."
+        note: if roughness > 0.0 && ior > 10.0 {
+            "Of what rough glass scatters between its facets the table misses less than a thousandth of the light, so that it never gains: what is let in here is reflected inside so often that much of it is lost."
+        } else if roughness > 0.0 {
+            "Of what rough glass scatters between its facets the table misses less than a thousandth of the light at each scattering, so that it never gains."
         } else if ior > 10.0 {
             "Facets that are not quite a sphere trap light for tens of thousands of reflections: few paths get out and count for very many, so that the error is underestimated."
         } else {

@@ -53,7 +53,7 @@ fn white_opaque_surfaces_and_sheets_lose_nothing() {
 
 #[test]
 fn white_glass_gains_nothing() {
-    for ior in [1.1, 1.5, 2.4] {
+    for ior in [1.02, 1.1, 1.5, 2.4, 10.0] {
         let surface = SurfaceParameters { ior, ..SOLID };
         for alpha in ALPHAS {
             let bsdf = rough(alpha, surface);
@@ -61,7 +61,10 @@ fn white_glass_gains_nothing() {
                 let found = albedo(&bsdf, tilted(angle, 2.0), 1 << 13).max_element();
                 assert!(found < 1.0 + 1e-3, "η {ior} α {alpha} at {angle}°: {found}");
                 // The margins of the table; exact where nothing is tabulated.
-                let least = if alpha < 1e-3 { 1.0 - 1e-5 } else { 0.98 };
+                // Of indices near one the table cannot follow the last degree to the horizon.
+                let grazing = if ior < 1.1 { 0.04 } else { 0.02 };
+                let margin = if (angle - 90.0_f64).abs() < 2.0 { grazing } else { 0.01 };
+                let least = if alpha < 1e-3 { 1.0 - 1e-5 } else { 1.0 - margin };
                 assert!(found > least, "η {ior} α {alpha} at {angle}°: {found}");
             }
         }

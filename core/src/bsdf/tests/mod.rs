@@ -9,6 +9,7 @@ mod finite;
 mod kept;
 pub(in crate::bsdf) mod oracle;
 mod reciprocity;
+pub(in crate::bsdf) mod rings;
 
 use crate::bsdf::Bsdf;
 use crate::bsdf::surface::{Finishing, Layers, SurfaceParameters, Walls};
