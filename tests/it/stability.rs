@@ -12,7 +12,7 @@ const SHARE: f64 = 0.001;
 
 /// What is known to fail: case, trial, and between what the result lies, relative to the known answer (of bounds: what was
 /// found). Mended, it fails here.
-const KNOWN: [(&str, &str, [f64; 2]); 13] = [
+const KNOWN: [(&str, &str, [f64; 2]); 12] = [
     ("a lamp in a white room of metal of roughness 0.8", "path", [-0.2964, -0.1976]),
     ("10⁻⁵ m at the side of 10⁵ m", "*", [-1.0000, -0.9900]),
     ("walls in the same planes", "path", [0.1167, 0.1750]),
@@ -23,9 +23,8 @@ const KNOWN: [(&str, &str, [f64; 2]); 13] = [
     ("a sheet 1e-7 m over a floor", "bidirectional", [0.6032, 0.9048]),
     ("lamps of radiance 10⁻³⁰ and 10³⁰", "light, of 10⁻³⁰", [-1.0000, -0.9900]),
     ("a ball of index 100", "path", [-0.0209, -0.0140]),
-    ("a ball of index 100, roughness 0.5", "path", [-0.0925, -0.0617]),
+    ("a ball of index 100, roughness 0.5", "path", [-0.0317, -0.0211]),
     ("100 solids of glass in each other", "path", [-1.0219, -0.6812]),
-    ("rough glass seen from both ends", "n = 2.4", [0.000_200, 0.000_201]),
 ];
 
 fn known(case: &str, by: &str) -> Option<[f64; 2]> {

@@ -77,7 +77,9 @@ impl Farm {
             }
             let reason = match time {
                 Some(time) if over > time => "it was kept as long as jobs are",
-                _ if bytes.is_some_and(|most| with_later > most) => "jobs that are over take up more than is kept",
+                _ if bytes.is_some_and(|most| with_later > most) => {
+                    "jobs that are over take up more than is kept"
+                }
                 // Later ones are over for a shorter time, and fit.
                 _ => return Ok(left),
             };
