@@ -58,10 +58,12 @@ fn white_glass_gains_nothing() {
         for alpha in ALPHAS {
             let bsdf = rough(alpha, surface);
             for angle in ANGLES.into_iter().flat_map(|angle| [angle, 180.0 - angle]) {
-                let found = albedo(&bsdf, tilted(angle, 2.0), 1 << 13).max_element();
-                assert!(found < 1.0 + 1e-3, "η {ior} α {alpha} at {angle}°: {found}");
-                // The margins of the table; exact where nothing is tabulated.
-                // Of indices near one the table cannot follow the last degree to the horizon.
+                let of = |points| albedo(&bsdf, tilted(angle, 2.0), points).max_element();
+                // Where the lattice errs by more, it needs more points.
+                let found = [1 << 13, 1 << 18].into_iter().map(of).find(|found| *found < 1.0 + 1e-3);
+                let found = found.unwrap_or_else(|| panic!("η {ior} α {alpha} at {angle}° gains"));
+                // The margins of the table; exact where nothing is tabulated. Of indices near one the table cannot
+                // follow the last degree to the horizon.
                 let grazing = if ior < 1.1 { 0.04 } else { 0.02 };
                 let margin = if (angle - 90.0_f64).abs() < 2.0 { grazing } else { 0.01 };
                 let least = if alpha < 1e-3 { 1.0 - 1e-5 } else { 1.0 - margin };
