@@ -6,7 +6,7 @@
 use crate::faults::undisturbed;
 use ovtigre_core::{
     film::exr::{Layers, read_layers},
-    settings::{Method, Settings},
+    settings::{Distribution, Method, Settings},
 };
 use ovtigre_proto::{id::JobId, status::JobState};
 use ovtigre_tests::{
@@ -45,15 +45,19 @@ struct Kind {
 }
 
 fn kinds() -> Vec<Kind> {
-    let kind = |size: u32, samples: u32, method: Method, flags: &[&'static str]| {
-        let wish = Settings { bounces: Some(2), method, ..settings(size, size, 4) };
+    let kind = |size: u32, samples: u32, (method, sampling), flags: &[&'static str]| {
+        let wish = Settings { bounces: Some(2), method, sampling, ..settings(size, size, 4) };
         let flags = [flags, &["--bounces", "2", "--method", method.name()]].concat();
         Kind { flags, samples, expected: undisturbed(&room(), &wish, samples) }
     };
+    let even = |method| (method, Distribution::Uniform);
+    let adaptive = ["--size", "24x24", "--samples", "1024", "--sampling", "adaptive"];
     vec![
-        kind(4, 4 * 1024, Method::Path, &["--size", "4x4", "--samples", "4096"]),
-        kind(12, 4 * 1024, Method::Path, &["--size", "12x12", "--samples", "4096"]),
-        kind(8, 4 * 1024, Method::Light, &["--size", "8x8", "--samples", "4096"]),
+        kind(4, 4 * 1024, even(Method::Path), &["--size", "4x4", "--samples", "4096"]),
+        kind(24, 1024, (Method::Path, Distribution::Adaptive), &adaptive),
+        kind(6, 4 * 1024, even(Method::Caustics), &["--size", "6x6", "--samples", "4096"]),
+        kind(12, 4 * 1024, even(Method::Path), &["--size", "12x12", "--samples", "4096"]),
+        kind(8, 4 * 1024, even(Method::Light), &["--size", "8x8", "--samples", "4096"]),
     ]
 }
 
