@@ -1,7 +1,10 @@
 //! The disk fills, and has room again; the picture does not change.
 
 use crate::faults::undisturbed;
-use ovtigre_core::{film::exr::read_layers, settings::Settings};
+use ovtigre_core::{
+    film::exr::read_layers,
+    settings::{Distribution, Settings},
+};
 use ovtigre_tests::{
     picture::settings,
     program::{Farm, run},
@@ -13,9 +16,6 @@ use std::{
     path::Path,
     time::Duration,
 };
-
-/// Samples a pixel, all four replicates together.
-const SAMPLES: u32 = 4 * 2048;
 
 /// Writes a file until `left` bytes or fewer are free on its disk.
 fn fill(file: &Path, left: u64) {
@@ -32,7 +32,7 @@ fn fill(file: &Path, left: u64) {
 /// Fills a disk of 8 MiB to the last byte while a job is rendered, makes room again, and asserts that its picture is that of
 /// core alone. What the farm does while it is full is told by `reserve` GiB.
 #[expect(clippy::print_stderr, reason = "says what is skipped")]
-fn assert_survives_a_full_disk(reserve: &str) {
+fn assert_survives_a_full_disk(reserve: &str, side: u32, samples: u32, sampling: Distribution) {
     let folder = tempfile::tempdir().unwrap();
     let data = folder.path().join("farm");
     let Some(farm) = Farm::start_on_a_disk(&data, 8, &["--reserve", reserve]) else {
@@ -44,9 +44,11 @@ fn assert_survives_a_full_disk(reserve: &str) {
     let inside = farm.root().join(data.strip_prefix("/").unwrap());
     let (scene, filler) = (folder.path().join("scene.glb"), inside.join("filler"));
     fs::write(&scene, room()).unwrap();
-    let samples = SAMPLES.to_string();
-    let flags = ["--size", "8x8", "--samples", &samples, "--bounces", "2", "--method", "path"];
-    let submit = [&["submit", scene.to_str().unwrap()], &flags[..]].concat();
+    let (size, count) = (format!("{side}x{side}"), samples.to_string());
+    let sampled = if sampling.is_uniform() { "uniform" } else { "adaptive" };
+    let what = ["--size", &size, "--samples", &count, "--sampling", sampled];
+    let how = ["--bounces", "2", "--method", "path"];
+    let submit = [&["submit", scene.to_str().unwrap()], &what[..], &how[..]].concat();
     let job = farm.client(&submit).trim().to_owned();
     let worker = farm.worker();
     let then = farm.wait(&job, |job| job["batches_done"].as_u64().unwrap() > 0);
@@ -66,17 +68,22 @@ fn assert_survives_a_full_disk(reserve: &str) {
     let file = folder.path().join("picture.exr");
     farm.client(&["fetch", &job, "-o", file.to_str().unwrap()]);
     let picture = read_layers(&fs::read(file).unwrap()).unwrap();
-    let wish = Settings { bounces: Some(2), ..settings(8, 8, 4) };
-    let expected = undisturbed(&room(), &wish, SAMPLES);
+    let wish = Settings { bounces: Some(2), sampling, ..settings(side, side, 4) };
+    let expected = undisturbed(&room(), &wish, samples);
     assert!(picture.channels == expected.channels, "the picture differs from that of core alone");
 }
 
 #[test]
 fn a_full_disk_without_a_reserve_changes_no_byte() {
-    assert_survives_a_full_disk("0");
+    assert_survives_a_full_disk("0", 8, 4 * 2048, Distribution::Uniform);
 }
 
 #[test]
 fn a_full_disk_with_a_reserve_changes_no_byte() {
-    assert_survives_a_full_disk("0.002");
+    assert_survives_a_full_disk("0.002", 8, 4 * 2048, Distribution::Uniform);
+}
+
+#[test]
+fn a_full_disk_changes_no_byte_of_an_adaptive_picture() {
+    assert_survives_a_full_disk("0", 24, 4 * 256, Distribution::Adaptive);
 }
