@@ -264,6 +264,9 @@ fn compare(name: &str, glb: &[u8], asked: &Arguments) -> anyhow::Result<String> 
             methods: METHODS.into_iter().filter(is_open).collect(),
         }
     };
+    if !METHODS.iter().any(is_open) {
+        bail!("{name}: no method makes all paths, so that there is nothing to choose from");
+    }
     let small = settings(SIZE.width, SIZE.height, REPLICATES);
     let prepared = prepare(glb, None, &small)?;
     let longest = asked.jobs.iter().map(|job| job.samples).max().context("there are no jobs")?;
