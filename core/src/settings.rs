@@ -78,6 +78,15 @@ pub enum CameraChoice {
     Index(u32),
 }
 
+impl fmt::Display for CameraChoice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Framed => f.write_str("framed"),
+            Self::Index(n) => write!(f, "{n}"),
+        }
+    }
+}
+
 /// How light is estimated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]

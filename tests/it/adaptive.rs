@@ -12,7 +12,8 @@ use ovtigre_tests::{
     services::Shared,
     tended::Tended,
 };
-use std::fs;
+use serde_json::Value;
+use std::{fs, thread::sleep, time::Duration};
 
 /// Samples a pixel, all four replicates together: a quarter of them are drawn before it is decided where the others go.
 const SAMPLES: u32 = 256;
@@ -107,4 +108,42 @@ fn more_samples_for_an_adaptive_picture_keep_its_allocations() {
     let picture = fetch(&farm, &job, folder.path());
     let at_once = undisturbed(&room(), &adaptive(), 2 * SAMPLES);
     assert!(picture.channels == at_once.channels, "it differs from one with all samples asked for at once");
+}
+
+/// The server dies before it has written how samples are allocated, and comes back after the job's time is over: the job ends
+/// with a row of the curve that is like that of a decision, but nothing was decided.
+#[test]
+fn a_job_that_ended_before_it_was_decided_is_decided_when_it_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = folder.path().join("farm");
+    let place = format!("{}:1", FailPoint::CheckpointBeforeRow.name());
+    let farm = Farm::start_among(&[("OVTIGRE_FAIL_POINT", &place)], &data, &[]);
+    let worker = farm.worker();
+    let flags = [&FLAGS[..], &["--seconds", "4"]].concat();
+    let job = submit(&farm, folder.path(), &room(), &adaptive(), SAMPLES, &flags);
+    sleep(Duration::from_secs(5));
+    drop((worker, farm));
+    let farm = Farm::start(&data);
+    let done = farm.wait(&job, |job| job["state"] == "done");
+    assert_eq!((&done["samples_done"], &done["allocations"]), (&64.0.into(), &Value::Null), "{done}");
+    // It asks at once.
+    let _worker = farm.worker();
+    while farm.client(&["workers"]).lines().count() < 3 {
+        sleep(Duration::from_millis(20));
+    }
+    let runtime = tokio::runtime::Runtime::new().unwrap();
+    let more = JobPatch { samples: Some(2 * SAMPLES), ..JobPatch::default() };
+    runtime.block_on(Client::new(&farm.url, 1).unwrap().change(&job.parse().unwrap(), &more)).unwrap();
+    let done = farm.wait(&job, |job| job["state"] == "done");
+    assert_eq!(done["samples_done"], 512.0, "{done}");
+    assert!(done["allocations"].is_array(), "{done}");
+    let workers = farm.client(&["workers", "--json"]);
+    assert_eq!(workers.matches("\"failures\":").count(), 2, "{workers}");
+    assert_eq!(
+        workers.replace(' ', "").matches("\"failures\":0").count(),
+        2,
+        "a worker is blamed: {workers}"
+    );
+    let expected = undisturbed(&room(), &adaptive(), 2 * SAMPLES).channels;
+    assert!(fetch(&farm, &job, folder.path()).channels == expected, "it differs from that of core alone");
 }

@@ -61,6 +61,8 @@ pub fn cases() -> Vec<Case> {
         case("room-bidirectional", room(), Method::Bidirectional, Method::Path),
         case("caustic-path", caustic(), Method::Path, Method::Bidirectional),
         case("lamp-behind-glass-path", lamp_behind_glass(), Method::Path, Method::Bidirectional),
+        case("room-caustics", room(), Method::Caustics, Method::Bidirectional),
+        case("caustic-caustics", caustic(), Method::Caustics, Method::Bidirectional),
         adaptive(case("cornell-adaptive", cornell(), Method::Path, Method::Bidirectional)),
         adaptive(case("caustic-adaptive", caustic(), Method::Path, Method::Bidirectional)),
     ]

@@ -224,6 +224,8 @@ fn picture() -> Vec<u8> {
         seed: 0,
         method: "path".to_owned(),
         paths: "L(D|S)*E".to_owned(),
+        camera: "0".to_owned(),
+        invalid: InvalidSamples::default(),
         layers: Vec::new(),
         manifest: "0".repeat(64),
         render_seconds: 1.0,

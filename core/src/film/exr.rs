@@ -74,6 +74,10 @@ pub struct PictureAttributes {
     pub method: String,
     /// The path expression.
     pub paths: String,
+    /// Number of the scene's camera, or `framed`.
+    pub camera: String,
+    /// Samples that were dropped.
+    pub invalid: InvalidSamples,
     /// Of each layer its name, and what it shows: a path expression, or a technique.
     pub layers: Vec<(String, String)>,
     /// Hash of the set of batches in the picture.
@@ -244,6 +248,8 @@ pub fn write_picture(picture: &Picture, attributes: &PictureAttributes) -> Vec<u
         ("ovtigre.seed", &attributes.seed.to_string()),
         ("ovtigre.method", &attributes.method),
         ("ovtigre.paths", &attributes.paths),
+        ("ovtigre.camera", &attributes.camera),
+        ("ovtigre.invalid", &invalid_text(attributes.invalid)),
         ("ovtigre.manifest", &attributes.manifest),
     ];
     let mut values: Vec<(&str, AttributeValue)> =
@@ -424,6 +430,8 @@ mod tests {
             seed: 1,
             method: "path".to_owned(),
             paths: "L(D|S)*E".to_owned(),
+            camera: "framed".to_owned(),
+            invalid: InvalidSamples { nan: 1, infinite: 0, negative: 2 },
             layers: vec![(long.clone(), "LDE".to_owned())],
             manifest: "m".to_owned(),
             render_seconds: 1.5,
@@ -438,7 +446,8 @@ mod tests {
         assert_eq!(layers.channels["R"], [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
         assert_eq!(layers.channels[&format!("{long}.error.R")][0], 0.2);
         assert_eq!(layers.attributes[&format!("ovtigre.layer.{long}")], "LDE");
-        assert_eq!(layers.attributes["ovtigre.paths"], "L(D|S)*E");
+        let said = ["paths", "camera", "invalid"].map(|what| &*layers.attributes[&format!("ovtigre.{what}")]);
+        assert_eq!(said, ["L(D|S)*E", "framed", "1,0,2"]);
     }
 
     #[test]

@@ -8,7 +8,8 @@ UPDATE job SET error_ppb = coalesce(
     (SELECT CASE WHEN relative_error < 1e9 THEN CAST(round(relative_error * 1e9) AS BIGINT) END
      FROM checkpoint WHERE checkpoint.job = job.id ORDER BY look DESC LIMIT 1),
     9000000000000000000);
-UPDATE job SET part_ppb = CASE WHEN state = 'done' THEN 1000000000 ELSE CAST(1e9 * least(1.0, coalesce(
+-- A document that holds the character zero is no JSONB.
+UPDATE job SET part_ppb = CASE WHEN state = 'done' THEN 1000000000 WHEN position('\u0000' IN spec) > 0 THEN 0 ELSE CAST(1e9 * least(1.0, coalesce(
     CAST(CAST(progress AS JSONB)->>'samples' AS DOUBLE PRECISION)
         / nullif(CAST(CAST(spec AS JSONB)->>'samples' AS DOUBLE PRECISION)
             * CAST(CAST(spec AS JSONB)->'settings'->>'replicates' AS DOUBLE PRECISION), 0),

@@ -103,7 +103,7 @@ fn parts(status: &JobStatus) -> Vec<String> {
     vec![
         state,
         words::samples(status),
-        words::error(status.error.as_ref()),
+        words::error(status),
         words::speed(status),
         left.map(|left| format!("{} left", words::duration(left))).unwrap_or_default(),
     ]

@@ -66,7 +66,7 @@ pub(crate) fn show(job: &JobStatus) {
         ("state", job.state.name().to_owned()),
         ("reason", job.reason.clone().unwrap_or_default()),
         ("samples", format!("{:.0} of {} a pixel", job.samples_done, job.samples_asked)),
-        ("error", words::error(job.error.as_ref()).trim_start_matches("error ").to_owned()),
+        ("error", words::error(job).trim_start_matches("error ").to_owned()),
         ("error target", job.error_target.map(|target| target.to_string()).unwrap_or_default()),
         ("run time", words::duration(job.wall_seconds)),
         ("worker time", words::duration(job.worker_seconds)),

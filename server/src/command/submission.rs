@@ -100,20 +100,21 @@ impl Submission {
         terminal::result(&words::list(&[
             self.output.png.as_ref().unwrap_or(&self.output.exr).display().to_string(),
             words::samples(status),
-            words::error(status.error.as_ref()),
+            words::error(status),
             words::duration(status.wall_seconds),
         ]));
         if let Some(target) =
             status.error_target.filter(|_| !status.certified && status.state == JobState::Done)
         {
-            terminal::remark(&format!(
-                "warning: the error is not certified to be under {target}: {}",
-                status
-                    .error
-                    .as_ref()
-                    .and_then(|row| row.doubt.as_ref())
-                    .map_or_else(|| "it needs more samples".to_owned(), ToString::to_string)
-            ));
+            let doubt = status.error.as_ref().and_then(|row| row.doubt.as_ref());
+            let why = match (doubt, status.settings.method) {
+                (_, method) if method.has_bias() => {
+                    format!("{} has a bias that the spread of samples does not show", method.name())
+                }
+                (Some(doubt), _) => doubt.to_string(),
+                (None, _) => "it needs more samples".to_owned(),
+            };
+            terminal::remark(&format!("warning: the error is not certified to be under {target}: {why}"));
         }
         match status.state {
             JobState::Done => Ok(()),

@@ -1,6 +1,6 @@
 //! Numbers as people read them.
 
-use ovtigre_proto::{curve::CurveRow, status::JobStatus};
+use ovtigre_proto::status::JobStatus;
 
 /// Seconds as `12.3 s`, `4:05` or `1:02:03`.
 pub(crate) fn duration(seconds: f64) -> String {
@@ -28,7 +28,12 @@ pub(crate) fn bytes(count: u64) -> String {
 }
 
 /// The relative error and its upper bound; empty where there is none.
-pub(crate) fn error(row: Option<&CurveRow>) -> String {
+pub(crate) fn error(status: &JobStatus) -> String {
+    let row = status.error.as_ref();
+    if let (true, Some(spread)) = (status.settings.method.has_bias(), row.and_then(|row| row.relative_error))
+    {
+        return format!("error ±{spread:.4} by spread alone");
+    }
     match row.map(|row| (row.relative_error, row.relative_error_upper, &row.doubt)) {
         Some((Some(error), _, Some(_))) => format!("error ±{error:.4} (not certified)"),
         Some((Some(error), Some(upper), None)) => format!("error ±{error:.4} (at most {upper:.4})"),

@@ -7,6 +7,7 @@ use ovtigre_core::film::{
     append::Prefix,
     batch::Batch,
     grid::Grid,
+    schedule::Schedule,
     size::Region,
 };
 use ovtigre_core::settings::{Distribution, Method};
@@ -47,7 +48,7 @@ pub(super) fn resolve(spec: &mut JobSpec) {
         spec.settings.sampling = Distribution::Uniform;
         let least = samples_min(&JobSpec { samples: SAMPLES_ENOUGH, ..spec.clone() }.schedule());
         spec.warnings.push(format!(
-            "{} samples are too few for adaptive sampling, which needs {least}: all pixels get the same number",
+            "{} samples are too few for adaptive sampling, which needs {least}: all pixels get the same number, also of samples that are asked for later",
             spec.samples_asked()
         ));
     }
@@ -74,6 +75,11 @@ impl Decision {
     pub fn is_awaited_by(&self, batch: Batch) -> bool {
         batch.block.index >= self.after && self.allocations.is_none()
     }
+}
+
+/// Checkpoints of a schedule that are taken before samples are allocated, which is `after` so many blocks.
+pub(super) fn looks_before(schedule: &Schedule, after: u32) -> u32 {
+    schedule.checkpoints().into_iter().filter(|blocks| (*blocks as u32) < after).count() as u32
 }
 
 impl Farm {

@@ -15,7 +15,7 @@ use crate::{
     fail_point::FailPoint,
     store::row::{BatchKey, CommitRow, Lane, Progress},
 };
-use ovtigre_core::film::{append::Prefix, schedule::Schedule, sum::Sum};
+use ovtigre_core::film::{append::Prefix, invalid::InvalidSamples, schedule::Schedule, sum::Sum};
 use ovtigre_proto::id::JobId;
 use std::{
     collections::{BTreeMap, VecDeque},
@@ -205,8 +205,15 @@ impl Merge {
             batches: all().map(|p| u64::from(p.blocks())).sum(),
             worker_micros: self.worker_micros,
             rays: all().map(Prefix::rays).sum(),
-            invalid: all().map(|p| p.invalid().total()).sum(),
+            invalid: self.invalid().total(),
         }
+    }
+
+    /// Samples that were dropped.
+    pub fn invalid(&self) -> InvalidSamples {
+        let mut all = InvalidSamples::default();
+        self.prefixes.iter().flatten().for_each(|prefix| all.add(prefix.invalid()));
+        all
     }
 
     /// Hash of the set of batches in the picture: of all that its pixels depend on.

@@ -47,7 +47,11 @@ impl Farm {
             waits: Waits::Not,
         };
         let ending = if reached {
-            Some(done("the error target was reached"))
+            Some(done(if live.spec.settings.method.has_bias() {
+                "the spread of the samples is under the error target; the method has a bias beside it"
+            } else {
+                "the error target was reached"
+            }))
         } else if merge.is_complete() {
             let doubt = row.doubt.filter(|_| live.spec.error_target.is_some());
             let doubt =

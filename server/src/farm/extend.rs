@@ -3,6 +3,7 @@
 
 use super::{
     Farm,
+    allocation::looks_before,
     append::{Merge, blocking},
     error::{FarmError, Result, fault},
     live::Live,
@@ -58,7 +59,7 @@ impl Farm {
             let extension = Extension {
                 spec: serde_json::to_string(&spec).map_err(|e| FarmError::Damaged(e.to_string()))?,
                 whole: common(&before, &after),
-                looks: self.looks(id, &after).await?,
+                looks: self.looks(id, &after, spec.decided_after).await?,
                 regions: after.regions().len() as u32,
                 replicates: after.replicates(),
             };
@@ -82,12 +83,20 @@ impl Farm {
         tokio::time::timeout(SETTLING, settled).await.unwrap_or(Err(FarmError::Stopping))
     }
 
-    /// Checkpoints taken that another schedule has, too.
-    async fn looks(&self, id: &JobId, after: &Schedule) -> Result<u32> {
+    /// Checkpoints taken that another schedule has, too. One at which samples were to be allocated, and at which a job ended
+    /// before they were, is still to be taken.
+    async fn looks(&self, id: &JobId, after: &Schedule, decided_after: Option<u32>) -> Result<u32> {
         let rows = self.curve_rows(id).await?;
         let points = after.checkpoints();
         let samples = points.iter().map(|blocks| after.samples_after(*blocks) * after.replicates());
-        Ok(rows.iter().zip(samples).take_while(|(row, samples)| row.samples == *samples).count() as u32)
+        let taken =
+            rows.iter().zip(samples).take_while(|(row, samples)| row.samples == *samples).count() as u32;
+        Ok(match decided_after {
+            Some(blocks) if self.store.allocations(id).await?.is_none() => {
+                taken.min(looks_before(after, blocks))
+            }
+            _ => taken,
+        })
     }
 
     /// The change in store and memory; `None` where somebody else was faster.

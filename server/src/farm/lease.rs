@@ -186,6 +186,11 @@ impl Farm {
         // Twice what workers hold or would take: none stands idle while a checkpoint is taken.
         let ahead = 2 * self.crew().capacity(self.rules.silence);
         let offers = self.book().offer(asker, ahead);
+        let (awaiting, offers): (Vec<Offer>, Vec<Offer>) =
+            offers.into_iter().partition(|offer| self.awaits_decision(offer));
+        for offer in awaiting {
+            self.book().withdraw(offer);
+        }
         if offers.is_empty() {
             return Ok((Vec::new(), BTreeSet::new()));
         }
@@ -206,7 +211,6 @@ impl Farm {
             let live = self.live(&offer.job);
             let batch = live.as_ref().and_then(|live| live.batch(offer.batch));
             let decision = live.and_then(|live| live.decision());
-            let batch = batch.filter(|batch| !decision.as_ref().is_some_and(|d| d.is_awaited_by(*batch)));
             // Not claimed: the job was paused or ended meanwhile, or began elsewhere on other processors.
             let (true, Some(batch)) = (claimed, batch) else {
                 refused.insert(offer.job.clone());
@@ -234,6 +238,13 @@ impl Farm {
         begun.dedup();
         begun.iter().filter_map(|job| self.live(job)).for_each(|live| live.changed());
         Ok((leases, refused))
+    }
+
+    /// Whether it has to be known first how samples are allocated.
+    fn awaits_decision(&self, offer: &Offer) -> bool {
+        let Some(live) = self.live(&offer.job) else { return false };
+        let batch = live.batch(offer.batch);
+        batch.zip(live.decision()).is_some_and(|(batch, decision)| decision.is_awaited_by(batch))
     }
 
     fn tell_handed_out(&self, lease: &LeaseRow, asked: SystemTime) {

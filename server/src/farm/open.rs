@@ -2,6 +2,7 @@
 
 use super::{
     Farm,
+    allocation::looks_before,
     book::{self, HandOut},
     error::{FarmError, Result},
     live::{Ending, Live, Waits, held},
@@ -101,7 +102,6 @@ impl Farm {
         let curve = self.store.curve(&row.id).await?;
         let layers = self.store.layers(&row.id).await?;
         let live = Arc::new(Live::new(row, spec, curve, layers));
-        self.learn_allocations(&live).await?;
         match held(&self.lives).entry(row.id.clone()) {
             Entry::Occupied(_) => return Ok(()),
             Entry::Vacant(place) => place.insert(Arc::clone(&live)),
@@ -120,8 +120,12 @@ impl Farm {
         if !ledger.commits.is_empty() {
             live.kick.notify_one();
         }
-        let schedule = Arc::clone(&live.schedule);
-        let plan = Plan::new(schedule, ledger.cursors, ledger.returned, ledger.checkpoints);
+        // After the ledger: what was decided before the checkpoints that it tells of is known then.
+        self.learn_allocations(live).await?;
+        let undecided = live.decision().filter(|decision| decision.allocations.is_none());
+        let before = undecided.map_or(u32::MAX, |decision| looks_before(&live.schedule, decision.after));
+        let reached = ledger.checkpoints.min(before);
+        let plan = Plan::new(Arc::clone(&live.schedule), ledger.cursors, ledger.returned, reached);
         let plan = plan.gated(live.spec.decided_after);
         let hand_out = if row.state == JobState::Paused { HandOut::Paused } else { HandOut::Yes };
         let settings = live.spec.settings.clone();

@@ -2,14 +2,14 @@
 
 use super::{
     Farm,
-    append::blocking,
+    append::{Merge, blocking},
     error::{FarmError, Result},
     live::{Live, Made, held},
     open::read_spec,
 };
 use crate::{
     blobs::{BlobError, BlobName},
-    store::row::{JobRow, Progress},
+    store::row::JobRow,
 };
 use bytes::Bytes;
 use futures::stream::BoxStream;
@@ -215,7 +215,7 @@ impl Farm {
         if let Some(made) = live.made().filter(|made| made.manifest == manifest) {
             return Ok(made);
         }
-        let attributes = attributes(&row, live, merge.progress(), manifest.clone());
+        let attributes = attributes(&row, live, merge, manifest.clone());
         let (size, region) = (live.spec.settings.size, live.spec.region);
         let bytes = blocking(move || {
             let picture = picture(size, region, &held.as_ref().expect("just read").prefixes);
@@ -278,7 +278,8 @@ fn plane(layers: &Layers, region: Region, prefix: &str) -> Option<Plane> {
 
 /// What a picture says of itself. All of it follows from job and set of batches, so that a file made
 /// twice says the same.
-fn attributes(row: &JobRow, live: &Live, progress: Progress, manifest: String) -> PictureAttributes {
+fn attributes(row: &JobRow, live: &Live, merge: &Merge, manifest: String) -> PictureAttributes {
+    let progress = merge.progress();
     let begun = row.started_at.unwrap_or(row.created_at);
     PictureAttributes {
         job: live.id.to_string(),
@@ -287,6 +288,8 @@ fn attributes(row: &JobRow, live: &Live, progress: Progress, manifest: String) -
         seed: live.spec.settings.seed,
         method: live.spec.settings.method.name().to_owned(),
         paths: shown(&live.spec.settings.paths).to_owned(),
+        camera: live.spec.settings.camera.to_string(),
+        invalid: merge.invalid(),
         layers: (live.spec.settings.layers.iter())
             .map(|layer| (layer.name.clone(), layer.shows.to_string()))
             .collect(),

@@ -2,13 +2,15 @@
 
 import { events, get, save, send, token } from './client.js';
 import { asked, confirmed, el, fill, notice, pause, refused, renew, repeat, text } from './dom.js';
-import { count, digits, errorOf, part, percent, samples, seconds, short, when } from './format.js';
+import { count, digits, errorOf, isBiased, part, percent, samples, seconds, short, when } from './format.js';
 import { badge } from './jobs.js';
 import { plot, table } from './plot.js';
 import { Viewer } from './viewer.js';
 import { allWorkers, workerHeads, workerRow } from './workers.js';
 
 const OVER = ['done', 'failed', 'cancelled'];
+/** Lines of the log. */
+const LINES = 100;
 
 class JobView {
   constructor(root, job, signal) {
@@ -72,11 +74,12 @@ class JobView {
 
   #tell(line) {
     this.log.unshift({ time: new Date().toISOString(), line });
+    this.log.length = Math.min(this.log.length, LINES);
     this.#showLog();
   }
 
   #showLog() {
-    fill(this.journal, this.log.slice(0, 100).map(({ time, at, line }) => el('li', {},
+    fill(this.journal, this.log.slice(0, LINES).map(({ time, at, line }) => el('li', {},
       time ? el('time', { datetime: time, title: when(time) }, new Date(time).toLocaleTimeString()) : el('span', { class: 'at' }, `after ${at}`), ' ', line)));
   }
 
@@ -134,7 +137,7 @@ class JobView {
     const error = errorOf(job);
     const one = (title, value, under, kind) => el('div', { class: kind ?? null }, el('dt', {}, title), el('dd', {}, value, under ? el('span', { class: 'under' }, under) : null));
     const target = job.error_target ? `${job.certified ? 'certified' : 'target'} ≤\u00a0${percent(job.error_target)}` : null;
-    const upper = job.error?.doubt ? 'not certified' : error?.upper ? `at most ${error.upper}` : null;
+    const upper = job.error?.doubt ? 'not certified' : isBiased(job) ? 'spread alone' : error?.upper ? `at most ${error.upper}` : null;
     const rays = job.worker_seconds > 0 ? `${short(job.rays / job.worker_seconds)} rays/s a worker` : null;
     fill(this.numbers,
       one('Error', error?.now ?? '–', [upper, target].filter(Boolean).join(' · '), job.certified ? 'good' : null),

@@ -2,10 +2,14 @@
 
 import { Problem, Watched, send } from './client.js';
 import { confirmed, el, fill, notice, refused, repeat, rested, text } from './dom.js';
-import { count, errorOf, part, percent, samples, seconds, since, when } from './format.js';
+import { count, errorOf, isBiased, part, percent, samples, seconds, since, when } from './format.js';
 
 const STATES = ['', 'running', 'queued', 'paused', 'done', 'failed', 'cancelled'];
 const PACE = 2000;
+/** Milliseconds between two pictures of a job that is not over. */
+const REST = 4000;
+/** How often a picture that is not there is asked for. */
+const TRIES = 5;
 /** What is chosen stays while the page is open. */
 const view = { state: '', text: '', limit: 50, cursors: [], sort: null, down: false };
 
@@ -48,20 +52,25 @@ class Thumbnail {
 
   update(job) {
     this.job = job;
-    const key = `${job.batches_done}.${job.state}`;
-    if (key !== this.key) {
-      this.key = key;
-      this.load();
-    }
+    this.key = `${job.batches_done}.${job.state}`;
+    this.load();
   }
 
   load() {
-    const late = Date.now() - (this.at ?? 0) > 4000 || this.job?.state === 'done';
-    if (!this.seen || this.loaded === this.key || !late || !(this.job?.samples_done > 0)) return;
+    if (!this.seen || this.loaded === this.key || this.signal.aborted || !(this.job?.samples_done > 0)) return;
+    const rest = this.job.state === 'done' ? 0 : (this.at ?? 0) + REST - Date.now();
+    if (rest > 0) return this.#later(rest);
     this.loaded = this.key;
     this.at = Date.now();
     Thumbnail.#waiting.push(this);
     Thumbnail.#next();
+  }
+
+  #later(rest) {
+    this.timer ??= setTimeout(() => {
+      this.timer = null;
+      this.load();
+    }, rest);
   }
 
   static #next() {
@@ -84,11 +93,13 @@ class Thumbnail {
       const canvas = el('canvas', { width: bitmap.width, height: bitmap.height });
       canvas.getContext('2d').drawImage(bitmap, 0, 0);
       fill(this.node, canvas);
+      this.failed = 0;
     } catch (error) {
       if (!(error instanceof Problem) && error.name !== 'AbortError') throw error;
-      // What was not there yet is asked for again.
-      this.key = null;
+      // What was not there yet is asked for again, but not for ever.
       this.loaded = null;
+      this.failed = (this.failed ?? 0) + 1;
+      if (this.failed < TRIES) this.#later(REST);
     }
   }
 }
@@ -130,9 +141,10 @@ class Row {
     text(this.done, job.state === 'done' ? `${samples(job.samples_done)} samples` : `${samples(job.samples_done)} of ${samples(job.samples_asked)} samples`);
     const error = errorOf(job);
     text(this.error, error ? `${error.now}` : '–');
-    this.error.title = error?.upper ? `at most ${error.upper} with 95 % confidence` : '';
+    const upper = isBiased(job) ? null : error?.upper;
+    this.error.title = upper ? `at most ${upper} with 95 % confidence` : '';
     const target = job.error_target;
-    text(this.target, target ? `${job.certified ? 'certified' : 'target'} ≤\u00a0${percent(target)}` : error?.upper ? `≤\u00a0${error.upper}` : '');
+    text(this.target, target ? `${job.certified ? 'certified' : 'target'} ≤\u00a0${percent(target)}` : upper ? `≤\u00a0${upper}` : '');
     const running = job.state === 'running';
     text(this.time, running && job.eta_seconds !== undefined ? `${seconds(job.eta_seconds)} left` : job.started_at ? seconds(job.wall_seconds) : '–');
     text(this.ran, running && job.eta_seconds !== undefined ? `after ${seconds(job.wall_seconds)}` : '');
@@ -283,6 +295,9 @@ export async function show(root, { signal }) {
 
   function turn() {
     turning += 1;
+    // Where a page ends is known when it is there.
+    older.disabled = true;
+    newer.disabled = true;
     watched.forget();
     load();
   }

@@ -284,12 +284,19 @@ class Form {
     return `${w}x${h}`;
   }
 
-  check = rested(() => this.#checkNow(), 250);
+  check() {
+    this.key = null;
+    this.#soon();
+  }
+
+  #soon = rested(() => this.#checkNow(), 250);
 
   async #checkNow() {
     if (!this.scene || this.signal.aborted) return;
-    const asked = (this.asked ?? 0) + 1;
-    this.asked = asked;
+    this.checking?.abort();
+    const checking = new AbortController();
+    this.checking = checking;
+    const signal = AbortSignal.any([this.signal, checking.signal]);
     let plan = null;
     let problem = null;
     if (this.#unread()) {
@@ -297,12 +304,12 @@ class Form {
       return;
     }
     try {
-      plan = await (await send('/v1/jobs?dry_run=true', { method: 'POST', json: this.request(), signal: this.signal })).json();
+      plan = await (await send('/v1/jobs?dry_run=true', { method: 'POST', json: this.request(), signal })).json();
     } catch (error) {
       if (!(error instanceof Problem)) return;
       problem = error;
     }
-    if (asked !== this.asked) return;
+    if (signal.aborted) return;
     this.#fault(problem);
     this.button.disabled = problem !== null && problem.status === 422;
     this.verdict.hidden = !plan;
@@ -371,7 +378,8 @@ class Form {
       const job = await response.json();
       location.hash = `#/job/${job.id}`;
     } catch (error) {
-      this.key = null;
+      // Where no answer came the job may have been taken: the same key asks for the same job.
+      if (error.status !== 0) this.key = null;
       this.#fault(error);
       notice(error.message, 'error');
       this.button.disabled = false;

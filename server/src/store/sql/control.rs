@@ -113,7 +113,7 @@ pub(super) async fn extend_job(db: &mut Db, id: &JobId, version: u64, to: Extens
 /// A job that is over goes on at what is kept of each lane.
 async fn go_on(db: &mut Db, id: &JobId, to: &Extension, now: i64) -> Result<()> {
     let open = query(
-        "UPDATE job SET state = 'queued', reason = NULL, settled = 0, certified = 0, manifest = NULL,
+        "UPDATE job SET state = 'queued', reason = NULL, settled = 0, certified = 0, manifest = NULL, part_ppb = 0,
             paused_ms = paused_ms + $2 - coalesce(ended_ms, $2), ended_ms = NULL WHERE id = $1",
     );
     db.execute(open.bind(id.as_str()).bind(now)).await?;

@@ -10,7 +10,7 @@ use super::{
     connection::Db,
     gathered::{not_there, of_jobs},
     job::read,
-    query::{Query, both, query},
+    query::{Query, both},
 };
 use crate::store::{
     error::Result,
@@ -19,14 +19,26 @@ use crate::store::{
 };
 use ovtigre_proto::{id::JobId, status::JobState};
 
-/// Rows of jobs that are looked for: in state `$3`, with text `$2`, or any where that is empty. `$1` at most.
-macro_rules! page {
-    ($($condition:literal),+; $($order:literal),+) => {
+/// Rows of jobs that are looked for: in state `$3`, with text `$2` in a name or an id, or any where that is empty. `$1` at most.
+macro_rules! found {
+    ($name:literal; $($condition:literal),+; $($order:literal),+) => {
         concat!(
             "SELECT ", columns_of!(job), " FROM job WHERE ", $($condition,)+ " AND ($3 = '' OR state = $3)
-             AND ($2 = '' OR lower(name) LIKE $2 ESCAPE '\\' OR lower(id) LIKE $2 ESCAPE '\\')
+             AND ($2 = '' OR ", $name, " LIKE $2 ESCAPE '\\' OR lower(id) LIKE $2 ESCAPE '\\')
              ORDER BY ", $($order,)+ " LIMIT $1"
         )
+    };
+}
+
+/// A page by SQLite, whose `lower` knows the letters of ASCII.
+macro_rules! page {
+    ($($condition:literal),+; $($order:literal),+) => { found!("lower(name)"; $($condition),+; $($order),+) };
+}
+
+/// A page by PostgreSQL, asked for the same letters.
+macro_rules! server_page {
+    ($($condition:literal),+; $($order:literal),+) => {
+        found!("lower(name COLLATE \"C\")"; $($condition),+; $($order),+)
     };
 }
 
@@ -36,11 +48,11 @@ macro_rules! ordered {
         match $which {
             (None, None) => both(
                 page!($key, " IS NOT NULL"; $key, $way, ", sequence", $way),
-                page!($server_key, " IS NOT NULL"; $server_key, $way, ", sequence", $way),
+                server_page!($server_key, " IS NOT NULL"; $server_key, $way, ", sequence", $way),
             ),
             (None, Some(_)) => both(
                 page!("state = $3"; $key, $way, ", sequence", $way),
-                page!("state >= $3 AND state <= $3"; "state", $way, ", ", $server_key, $way, ", sequence", $way),
+                server_page!("state >= $3 AND state <= $3"; "state", $way, ", ", $server_key, $way, ", sequence", $way),
             ),
             (Some(_), None) => both(
                 concat!(
@@ -48,7 +60,7 @@ macro_rules! ordered {
                     ") UNION ALL SELECT * FROM (", page!($key, $than, "$4"; $key, $way, ", sequence", $way),
                     ") LIMIT $1"
                 ),
-                page!("(", $server_key, ", sequence)", $than, "($4, $5)"; $server_key, $way, ", sequence", $way),
+                server_page!("(", $server_key, ", sequence)", $than, "($4, $5)"; $server_key, $way, ", sequence", $way),
             ),
             (Some(_), Some(_)) => both(
                 concat!(
@@ -56,7 +68,7 @@ macro_rules! ordered {
                     ") UNION ALL SELECT * FROM (",
                     page!("state = $3 AND ", $key, $than, "$4"; $key, $way, ", sequence", $way), ") LIMIT $1"
                 ),
-                page!(
+                server_page!(
                     "(state, ", $server_key, ", sequence)", $than, "($3, $4, $5) AND state", $within, "$3";
                     "state", $way, ", ", $server_key, $way, ", sequence", $way
                 ),
@@ -69,15 +81,21 @@ macro_rules! ordered {
 macro_rules! as_they_came {
     ($way:literal, $than:literal, $within:literal, $which:expr) => {
         match $which {
-            (None, None) => query(page!("sequence IS NOT NULL"; "sequence", $way)),
+            (None, None) => both(
+                page!("sequence IS NOT NULL"; "sequence", $way),
+                server_page!("sequence IS NOT NULL"; "sequence", $way),
+            ),
             (None, Some(_)) => both(
                 page!("state = $3"; "sequence", $way),
-                page!("state >= $3 AND state <= $3"; "state", $way, ", sequence", $way),
+                server_page!("state >= $3 AND state <= $3"; "state", $way, ", sequence", $way),
             ),
-            (Some(_), None) => query(page!("sequence", $than, "$4"; "sequence", $way)),
+            (Some(_), None) => both(
+                page!("sequence", $than, "$4"; "sequence", $way),
+                server_page!("sequence", $than, "$4"; "sequence", $way),
+            ),
             (Some(_), Some(_)) => both(
                 page!("state = $3 AND sequence", $than, "$4"; "sequence", $way),
-                page!(
+                server_page!(
                     "(state, sequence)", $than, "($3, $4) AND state", $within, "$3";
                     "state", $way, ", sequence", $way
                 ),
