@@ -40,6 +40,13 @@ pub(super) async fn jobs_are_listed_page_by_page(store: &dyn Store) {
     assert_eq!(store.unknown_jobs(vec![id("x"), id("b"), id("y")]).await.unwrap(), [id("x"), id("y")]);
     assert_eq!(store.unknown_jobs(Vec::new()).await.unwrap(), []);
     assert_eq!(store.counts().await.unwrap().jobs.iter().map(|(_, n)| n).sum::<u64>(), 4);
+    // Capital letters are those of ASCII, whatever a database takes for them.
+    let named = NewJob { name: "Öl".to_owned(), ..new_job("e") };
+    store.add_job(named, None).await.unwrap();
+    for (text, found) in [("Öl", 1), ("ÖL", 1), ("öl", 0)] {
+        let filter = JobFilter { text: Some(text.to_owned()), limit: 9, ..JobFilter::default() };
+        assert_eq!(store.jobs(filter).await.unwrap().len(), found, "{text}");
+    }
 }
 
 /// All jobs of a state, fetched in pages of `limit`.
