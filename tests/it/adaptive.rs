@@ -54,7 +54,13 @@ fn a_killed_worker_changes_no_byte_of_an_adaptive_picture() {
 fn a_server_may_die_before_and_after_it_has_decided() {
     let settings = adaptive();
     let expected = undisturbed(&room(), &settings, SAMPLES);
-    for point in [FailPoint::CheckpointBeforeRow, FailPoint::CheckpointAfterRow, FailPoint::PrefixAfterRow] {
+    for point in [
+        FailPoint::CheckpointBeforeRow,
+        FailPoint::CheckpointAfterRow,
+        FailPoint::PrefixAfterRow,
+        FailPoint::EndBeforeResult,
+        FailPoint::EndAfterResult,
+    ] {
         let place = format!("{}:1", point.name());
         let folder = tempfile::tempdir().unwrap();
         let flags = ["--partials-kept", "2", "--reserve", "0"];

@@ -102,6 +102,7 @@ impl Farm {
         let curve = self.store.curve(&row.id).await?;
         let layers = self.store.layers(&row.id).await?;
         let live = Arc::new(Live::new(row, spec, curve, layers));
+        self.learn_allocations(&live).await?;
         match held(&self.lives).entry(row.id.clone()) {
             Entry::Occupied(_) => return Ok(()),
             Entry::Vacant(place) => place.insert(Arc::clone(&live)),
@@ -120,7 +121,7 @@ impl Farm {
         if !ledger.commits.is_empty() {
             live.kick.notify_one();
         }
-        // After the ledger: what was decided before the checkpoints that it tells of is known then.
+        // Again after the ledger: what was decided before the checkpoints that it tells of is known then.
         self.learn_allocations(live).await?;
         let undecided = live.decision().filter(|decision| decision.allocations.is_none());
         let before = undecided.map_or(u32::MAX, |decision| looks_before(&live.schedule, decision.after));

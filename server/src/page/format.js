@@ -77,7 +77,8 @@ export function errorOf(job) {
   return { now: percent(row.relative_error), upper: upper === null ? null : percent(upper) };
 }
 
-/** Part of the job that is done, 0 to 1: all of it where a smaller error or the time ended it before all samples. */
 /** Whether a method is off by more than its samples' spread shows. */
 export const isBiased = (job) => job.method === 'photon' || job.method === 'radiosity';
+
+/** Part of the job that is done, 0 to 1: all of it where a smaller error or the time ended it before all samples. */
 export const part = (job) => (job.state === 'done' ? 1 : job.samples_asked > 0 ? Math.min(1, job.samples_done / job.samples_asked) : 0);

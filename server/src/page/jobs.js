@@ -47,17 +47,20 @@ class Thumbnail {
     this.node.thumbnail = this;
     this.watched = new Watched();
     this.signal = signal;
+    this.failed = 0;
     Thumbnail.#watch.observe(this.node);
   }
 
   update(job) {
     this.job = job;
-    this.key = `${job.batches_done}.${job.state}`;
+    const key = `${job.batches_done}.${job.state}`;
+    if (key !== this.key) this.failed = 0;
+    this.key = key;
     this.load();
   }
 
   load() {
-    if (!this.seen || this.loaded === this.key || this.signal.aborted || !(this.job?.samples_done > 0)) return;
+    if (!this.seen || this.loaded === this.key || this.failed >= TRIES || this.signal.aborted || !(this.job?.samples_done > 0)) return;
     const rest = this.job.state === 'done' ? 0 : (this.at ?? 0) + REST - Date.now();
     if (rest > 0) return this.#later(rest);
     this.loaded = this.key;
@@ -98,8 +101,8 @@ class Thumbnail {
       if (!(error instanceof Problem) && error.name !== 'AbortError') throw error;
       // What was not there yet is asked for again, but not for ever.
       this.loaded = null;
-      this.failed = (this.failed ?? 0) + 1;
-      if (this.failed < TRIES) this.#later(REST);
+      this.failed += 1;
+      this.#later(REST);
     }
   }
 }
