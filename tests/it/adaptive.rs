@@ -13,7 +13,8 @@ use ovtigre_tests::{
     tended::Tended,
 };
 use serde_json::Value;
-use std::{fs, thread::sleep, time::Duration};
+use sqlx::{Connection as _, SqliteConnection};
+use std::{fs, path::Path, thread::sleep, time::Duration};
 
 /// Samples a pixel, all four replicates together: a quarter of them are drawn before it is decided where the others go.
 const SAMPLES: u32 = 256;
@@ -116,6 +117,18 @@ fn more_samples_for_an_adaptive_picture_keep_its_allocations() {
     assert!(picture.channels == at_once.channels, "it differs from one with all samples asked for at once");
 }
 
+/// Makes the one job of a farm that is not there an hour older.
+fn age(data: &Path) {
+    let runtime = tokio::runtime::Runtime::new().unwrap();
+    runtime.block_on(async {
+        let database = data.join("farm.sqlite");
+        let mut database = SqliteConnection::connect(database.to_str().unwrap()).await.unwrap();
+        let jobs = "UPDATE job SET started_ms = started_ms - 3600000";
+        assert_eq!(sqlx::query(jobs).execute(&mut database).await.unwrap().rows_affected(), 1);
+        database.close().await.unwrap();
+    });
+}
+
 /// The server dies before it has written how samples are allocated, and comes back after the job's time is over: the job ends
 /// with a row of the curve that is like that of a decision, but nothing was decided.
 #[test]
@@ -125,10 +138,11 @@ fn a_job_that_ended_before_it_was_decided_is_decided_when_it_goes_on() {
     let place = format!("{}:1", FailPoint::CheckpointBeforeRow.name());
     let farm = Farm::start_among(&[("OVTIGRE_FAIL_POINT", &place)], &data, &[]);
     let worker = farm.worker();
-    let flags = [&FLAGS[..], &["--seconds", "4"]].concat();
+    let flags = [&FLAGS[..], &["--seconds", "3600"]].concat();
     let job = submit(&farm, folder.path(), &room(), &adaptive(), SAMPLES, &flags);
-    sleep(Duration::from_secs(5));
-    drop((worker, farm));
+    farm.died();
+    drop(worker);
+    age(&data);
     let farm = Farm::start(&data);
     let done = farm.wait(&job, |job| job["state"] == "done");
     assert_eq!((&done["samples_done"], &done["allocations"]), (&64.0.into(), &Value::Null), "{done}");

@@ -64,7 +64,7 @@ impl Drop for Process {
     }
 }
 
-/// Longest wait for a job.
+/// Longest wait for a job, or for a farm.
 const PATIENCE: Duration = Duration::from_mins(2);
 
 /// A farm that listens on a free port of the loopback.
@@ -140,6 +140,15 @@ impl Farm {
     /// SIGKILL: no farewell.
     pub fn kill(self) {
         self.process.kill();
+    }
+
+    /// Waits until it has died by itself, at most two minutes.
+    pub fn died(mut self) {
+        let start = Instant::now();
+        while self.process.0.try_wait().expect("it is a child").is_none() {
+            assert!(start.elapsed() < PATIENCE, "it lives");
+            std::thread::sleep(Duration::from_millis(20));
+        }
     }
 
     /// Seconds of processor time that its process has taken, and the most bytes that it ever had in memory.

@@ -183,6 +183,18 @@ impl Live {
         self.kick.notify_one();
     }
 
+    /// Asks the job to end where it has run for as long as it may.
+    pub fn end_in_time(&self, run_seconds: f64) {
+        if self.spec.seconds.is_some_and(|most| run_seconds >= most) {
+            self.end(Ending {
+                state: JobState::Done,
+                reason: Some("the time was over".to_owned()),
+                certified: false,
+                waits: Waits::ForPicture,
+            });
+        }
+    }
+
     /// How it is to end, where that was asked for.
     pub fn ending(&self) -> Option<Ending> {
         held(&self.ending).clone()

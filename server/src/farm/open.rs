@@ -110,6 +110,7 @@ impl Farm {
         if row.state.is_over() {
             live.end(Ending { state: row.state, reason: None, certified: false, waits: Waits::Not });
         } else {
+            live.end_in_time(row.run_seconds);
             self.hand_out_from(row, &live).await?;
         }
         self.tasks.spawn(Arc::clone(self).pump(live));

@@ -4,10 +4,10 @@ use super::{
     Farm,
     counters::Fate,
     error::{FarmError, Result},
-    live::{Ending, Live, Waits},
+    live::Live,
 };
 use crate::store::error::StoreError;
-use ovtigre_proto::{lease::FailureKind, status::JobState};
+use ovtigre_proto::lease::FailureKind;
 use std::{
     sync::Arc,
     time::{Duration, Instant},
@@ -34,16 +34,11 @@ impl Farm {
             self.crew().remove(&worker);
         }
         for live in self.lives() {
-            if let Some(seconds) = live.spec.seconds
+            if live.spec.seconds.is_some()
                 && live.ending().is_none()
-                && self.store.job(&live.id).await?.is_some_and(|row| row.run_seconds >= seconds)
+                && let Some(row) = self.store.job(&live.id).await?
             {
-                live.end(Ending {
-                    state: JobState::Done,
-                    reason: Some("the time was over".to_owned()),
-                    certified: false,
-                    waits: Waits::ForPicture,
-                });
+                live.end_in_time(row.run_seconds);
             }
         }
         Ok(())
