@@ -161,9 +161,9 @@ pub enum Shows {
     Strategy(Strategy),
     /// The picture of `photon` with half the area of gathering: the difference tells its bias.
     Narrow,
-    /// Of `caustics`: what a sample of `path` is squared, in the mean, by light that light subpaths bring to the lens more often than
-    /// it meets it. It tells of its error what its own samples cannot, before one of them has met that light.
-    Chance,
+    /// Squares of what a method adds to a pixel, path by path: in a picture of that method as its own samples find them, and in one of
+    /// `bidirectional` as all techniques do, also before that method's have met some of the light.
+    Squares(Method),
 }
 
 impl fmt::Display for Shows {
@@ -173,7 +173,7 @@ impl fmt::Display for Shows {
             Self::Paths(paths) => f.write_str(paths),
             Self::Strategy(Strategy { s, t }) => write!(f, "({s},{t})"),
             Self::Narrow => f.write_str("half the area of gathering"),
-            Self::Chance => f.write_str("squares of what is met by chance"),
+            Self::Squares(method) => write!(f, "squares of what {} adds", method.name()),
         }
     }
 }

@@ -31,6 +31,8 @@ pub struct FromLight<'a, C: Carriage> {
     pub vertices: Vec<LightVertex<'a, C::Light>>,
     keeps: Keeps,
     pub(in crate::path) start: LightStart,
+    /// What the first surface makes of light.
+    cast: Cast,
     origin: Origin<'a>,
 }
 
@@ -69,10 +71,13 @@ impl<'a, C: Carriage> Visitor<'a, LightState, C::Light> for FromLight<'a, C> {
     }
 
     fn scatters(&mut self, walk: &Walk<'a, LightState, C::Light>, vertex: &Vertex<'a>, tally: &mut Tally) {
+        if walk.scatterings == 0 {
+            self.cast = vertex.cast();
+        }
         if !vertex.is_smooth() || !self.leaves(walk, vertex) {
             return;
         }
-        to_lens::<C::Eye, C::Light>(walk, vertex, self.start, tally);
+        to_lens::<C::Eye, C::Light>(walk, vertex, (self.start, self.cast), tally);
         if self.keeps == Keeps::Vertices {
             self.vertices.push(LightVertex {
                 vertex: vertex.clone(),
@@ -80,6 +85,8 @@ impl<'a, C: Carriage> Visitor<'a, LightState, C::Light> for FromLight<'a, C> {
                 partial: walk.partial,
                 media: walk.media,
                 vertices: walk.scatterings as usize + 2,
+                cast: self.cast,
+                survival: walk.rules.tells_squares().then(|| Box::new(walk.survival.clone())),
                 links: walk.links.clone(),
                 start: self.start,
             });
@@ -170,7 +177,7 @@ pub(in crate::path) fn set_out<'a, C: Carriage>(
         walk.links.push(Link { forward: place, reverse: 0.0, jacobian: 0.0, specular: false });
     }
     let start = LightStart { next_event: place, is_hit };
-    (walk, FromLight { vertices: Vec::new(), keeps, start, origin })
+    (walk, FromLight { vertices: Vec::new(), keeps, start, cast: Cast::Diffuse, origin })
 }
 
 /// Joins the place that light starts from to the lens itself.

@@ -9,6 +9,7 @@ pub mod mis;
 pub mod photons;
 pub mod reach;
 pub mod rules;
+pub mod survival;
 pub mod tally;
 pub mod throughput;
 pub mod vertex;

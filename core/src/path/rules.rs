@@ -45,7 +45,7 @@ pub struct Rules {
     /// The plane of each technique that has one.
     technique_planes: Vec<(Technique, usize)>,
     narrow_plane: Option<usize>,
-    chance_plane: Option<usize>,
+    square_planes: Vec<(Method, usize)>,
     /// What a material does to light, by its number; `None` where textures tell.
     even: Vec<Option<Bsdf>>,
     /// The solids around the eye, where all its rays start at one point.
@@ -73,7 +73,7 @@ impl Rules {
     pub fn new(scene: &Scene, settings: &Settings, pixels: usize) -> Result<Self, ExpressionError> {
         let mut expressions = vec![settings.paths.as_str()];
         let (mut rule_planes, mut technique_planes) = (vec![0], Vec::new());
-        let (mut narrow_plane, mut chance_plane) = (None, None);
+        let (mut narrow_plane, mut square_planes) = (None, Vec::new());
         for (i, layer) in settings.layers.iter().enumerate() {
             match &layer.shows {
                 Shows::Paths(paths) => {
@@ -84,7 +84,7 @@ impl Rules {
                     technique_planes.push(((*s as usize, *t as usize), i + 1));
                 }
                 Shows::Narrow => narrow_plane = Some(i + 1),
-                Shows::Chance => chance_plane = Some(i + 1),
+                Shows::Squares(method) => square_planes.push((*method, i + 1)),
             }
         }
         let language = Language::compile(&expressions)?;
@@ -104,7 +104,7 @@ impl Rules {
             rule_planes,
             technique_planes,
             narrow_plane,
-            chance_plane,
+            square_planes,
             media_of_eye: scene.eye().map(|eye| Media::around(scene, eye, Moment::STILL, &mut 0)),
         })
     }
@@ -122,8 +122,8 @@ impl Rules {
 
     /// Number of pictures.
     pub fn planes(&self) -> usize {
-        let further = [self.narrow_plane, self.chance_plane];
-        self.rule_planes.len() + self.technique_planes.len() + further.iter().flatten().count()
+        let further = usize::from(self.narrow_plane.is_some()) + self.square_planes.len();
+        self.rule_planes.len() + self.technique_planes.len() + further
     }
 
     /// The plane that shows the picture with half the area of gathering.
@@ -131,9 +131,14 @@ impl Rules {
         self.narrow_plane
     }
 
-    /// The plane of squares of what `path` meets by chance.
-    pub fn chance_plane(&self) -> Option<usize> {
-        self.chance_plane
+    /// The planes of squares of what methods add.
+    pub fn square_planes(&self) -> &[(Method, usize)] {
+        &self.square_planes
+    }
+
+    /// Whether squares are told of other methods than the one that renders.
+    pub fn tells_squares(&self) -> bool {
+        !self.square_planes.is_empty() && matches!(self.weighing, Weighing::All(_))
     }
 
     /// Whether every path counts, for one picture.

@@ -4,10 +4,7 @@ use crate::math::colour::Rgb;
 use crate::path::expression::language::{EyeState, LightState};
 use crate::path::rules::Rules;
 use crate::path::throughput::Throughput;
-use glam::{DVec3, Vec3};
-
-/// A weight may be short of one by rounding alone.
-const SURE: f64 = 1e-12;
+use glam::Vec3;
 
 /// Light for a pixel that a light subpath found.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -106,35 +103,9 @@ impl Tally {
         });
     }
 
-    /// Adds to the plane of squares, where there is one: of a path that joins light to the lens with `factor`, whose weight against
-    /// what eye subpaths do is `weight`. They make it with 1/weight − 1 times the density, so that the mean of f² over theirs is that
-    /// of factor² · weight / (1 − weight) over those of the light; what they make more often counts the less.
-    pub fn deposit_square(
-        &mut self,
-        rules: &Rules,
-        pixel: [u32; 2],
-        eye: &impl Throughput<EyeState>,
-        light: &impl Throughput<LightState>,
-        (factor, weight): (Rgb, f64),
-    ) {
-        let Some(plane) = rules.chance_plane() else { return };
-        let mut whole = Vec3::ZERO;
-        eye.each(|q, from_eye| {
-            light.each(|l, from_light| {
-                if let (Some(q), Some(l)) = (q, l)
-                    && rules.language.accepts(q, l).has(0)
-                {
-                    whole += from_eye * from_light * factor;
-                }
-            });
-        });
-        let weighted = whole.as_dvec3() * weight;
-        let square = weighted * weighted / (1.0 - weight).max(SURE);
-        self.add(Receiver::Pixel(pixel), plane, square.min(DVec3::splat(f64::from(f32::MAX))).as_vec3());
-    }
-
+    /// Adds to one plane.
     #[inline]
-    fn add(&mut self, receiver: Receiver, plane: usize, value: Rgb) {
+    pub fn add(&mut self, receiver: Receiver, plane: usize, value: Rgb) {
         match receiver {
             Receiver::Own => self.planes[plane] += value,
             Receiver::Pixel(pixel) => self.splats.push(Splat { pixel, plane: plane as u32, value }),

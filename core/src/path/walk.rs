@@ -8,6 +8,7 @@ use crate::path::media::Media;
 use crate::path::mis::exhaustive::{Ends, Link};
 use crate::path::mis::partial::Partial;
 use crate::path::rules::{Rules, Weighing};
+use crate::path::survival::{ROULETTE_FROM, Survival, turned};
 use crate::path::tally::Tally;
 use crate::path::throughput::{State, Throughput};
 use crate::path::vertex::{Cast, Continuation, Crossing, Density, Vertex};
@@ -19,10 +20,6 @@ use crate::scene::view::View;
 use crate::trace::ray::Ray;
 use core::marker::PhantomData;
 use glam::Vec3;
-
-/// Scatterings before which no walk is ended by roulette. Measured as error² · time, smaller is better, from 2, 5 and
-/// 9 on: a Cornell box 70, 51, 50; a hall with many lamps 26, 25, 26; a textured helmet 24, 12, 13.
-const ROULETTE_FROM: u32 = 5;
 
 /// Ideally specular scatterings in a row from which on a walk is also ended with probability 2 / n at its n-th: a walk that
 /// clear glass has trapped by total reflection loses nothing and would never end. The chance to reach n falls as n⁻², so a
@@ -64,6 +61,8 @@ pub struct Walk<'a, S: State, T: Throughput<S>> {
     pub links: Vec<Link>,
     /// What the surface behind makes of light, where weights ask for that.
     pub cast: Cast,
+    /// What roulette has done to it.
+    pub survival: Survival,
     transport: Transport,
     /// The part of its throughput that is due to refraction: it comes back when the path leaves.
     eta_squared: f32,
@@ -163,6 +162,7 @@ impl<'a, S: State, T: Throughput<S>> Walk<'a, S, T> {
             sight: Sight::Clear,
             links: Vec::new(),
             cast: Cast::Diffuse,
+            survival: Survival::SURE,
             transport,
             eta_squared: 1.0,
             scale,
@@ -217,7 +217,7 @@ impl<'a, S: State, T: Throughput<S>> Walk<'a, S, T> {
 
     /// Whether weights are computed from all densities.
     pub fn keeps_links(&self) -> bool {
-        matches!(self.rules.weighing, Weighing::Chosen(_))
+        matches!(self.rules.weighing, Weighing::Chosen(_)) || self.rules.tells_squares()
     }
 
     /// From where the scene is seen at the walk's moment.
@@ -281,7 +281,9 @@ impl<'a, S: State, T: Throughput<S>> Walk<'a, S, T> {
         } else {
             (self.sight, self.mirrored) = (Sight::Scattered, 0);
         }
-        if self.scatterings >= ROULETTE_FROM && !self.survives(choice.y) {
+        if self.scatterings < ROULETTE_FROM {
+            self.survival.scatter(1.0);
+        } else if !self.survives(choice.y) {
             return false;
         }
         self.follow::<V>(vertex, &next);
@@ -290,14 +292,27 @@ impl<'a, S: State, T: Throughput<S>> Walk<'a, S, T> {
 
     /// Takes the edge that a continuation leads to.
     pub(in crate::path) fn follow<V: Visitor<'a, S, T>>(&mut self, vertex: &Vertex<'_>, next: &Continuation) {
-        let Continuation { direction, density, crossing, .. } = *next;
+        let Continuation { direction, density, crossing, weight, .. } = *next;
         let cos = vertex.cos(direction);
-        self.look_back::<V>(vertex, direction, density, cos);
+        let reverse = self.look_back::<V>(vertex, direction, density, cos);
+        if self.rules.tells_squares() {
+            self.survival.turned.push(match density {
+                Density::SolidAngle(forward) => {
+                    turned(weight.total(), [f64::from(forward), reverse], [cos, vertex.cos(vertex.back())])
+                }
+                Density::Delta => weight.total(),
+            });
+        }
         if crossing == Crossing::Crosses {
             self.media.cross(&vertex.at, direction);
         }
         let ray = vertex.ray(direction);
         self.edge = Edge { ray, from: vertex.lit(), cos, density, kind: EdgeKind::Directions };
+    }
+
+    /// What it carries over what it began with, without the factors of refraction.
+    pub fn throughput(&self) -> Rgb {
+        self.carried.total() * (self.eta_squared * self.scale)
     }
 
     fn survives(&mut self, u: f32) -> bool {
@@ -313,18 +328,22 @@ impl<'a, S: State, T: Throughput<S>> Walk<'a, S, T> {
             return false;
         }
         self.carried.scale(Rgb::splat(1.0 / survival));
+        self.survival.scatter(survival);
         true
     }
 
-    /// What weights keep of a scattering.
+    /// What weights keep of a scattering. Returns the density over solid angle of the way it came, where weights ask for that.
     fn look_back<V: Visitor<'a, S, T>>(
         &mut self,
         vertex: &Vertex<'_>,
         direction: Vec3,
         density: Density,
         cos: f64,
-    ) {
+    ) -> f64 {
         let h = self.rules.heuristic();
+        if self.rules.tells_squares() {
+            self.cast = vertex.cast();
+        }
         if matches!(self.rules.weighing, Weighing::Caustics) {
             self.cast = vertex.cast();
             if self.scatterings > 1 {
@@ -334,11 +353,12 @@ impl<'a, S: State, T: Throughput<S>> Walk<'a, S, T> {
         let Density::SolidAngle(forward) = density else {
             self.partial.scatter_specular(h, cos);
             self.remember(1.0, density);
-            return;
+            return 1.0;
         };
         let reverse = if V::TWO_WAY { f64::from(vertex.reverse_pdf(direction)) } else { 0.0 };
         self.partial.scatter(h, f64::from(forward), reverse, cos);
         self.remember(reverse, density);
+        reverse
     }
 
     fn remember(&mut self, reverse: f64, density: Density) {

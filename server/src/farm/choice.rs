@@ -121,7 +121,7 @@ impl Farm {
 fn asked(settings: &Settings) -> Letters {
     let layers = settings.layers.iter().filter_map(|layer| match &layer.shows {
         Shows::Paths(paths) => Some(paths.as_str()),
-        Shows::Strategy(_) | Shows::Narrow | Shows::Chance => None,
+        Shows::Strategy(_) | Shows::Narrow | Shows::Squares(_) => None,
     });
     let paths: Vec<&str> = iter::once(settings.paths.as_str()).chain(layers).collect();
     Language::compile(&paths).map_or(Letters::NONE, |language| language.letters())

@@ -316,12 +316,12 @@ fn fixed(out: &mut String, measured: &[Measured], best: f64, tried: &Tried) -> a
         let by_pilot = trials.into_iter().find(|trial| trial.method == one.method());
         let by_pilot = by_pilot.map_or("–".to_owned(), |trial| {
             format!(
-                "{:.2} (error {:.3}, by its error {:.3}, missed {:.3}, by chance {:.3})",
+                "{:.2} (error {:.3}, by its error {:.3}, expected {:.3}, missed {:.3})",
                 trial.time_ratio,
                 trial.relative_error,
                 trial.square_error.sqrt(),
-                trial.missed,
-                trial.by_chance
+                trial.expected_error,
+                trial.missed
             )
         });
         let rays: u64 = one.lanes.iter().map(Prefix::rays).sum();

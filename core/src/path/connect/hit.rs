@@ -3,9 +3,10 @@
 use crate::math::colour::Rgb;
 use crate::math::cosine::cosine;
 use crate::path::connect::light_vertex::LightStart;
+use crate::path::connect::squares::{self, Made};
 use crate::path::connect::whole::{Joint, whole};
 use crate::path::expression::language::{EyeState, LightState};
-use crate::path::mis::exhaustive::Link;
+use crate::path::mis::exhaustive::{Link, PathDensity};
 use crate::path::mis::recursive;
 use crate::path::rules::Weighing;
 use crate::path::tally::{Receiver, Tally};
@@ -27,6 +28,12 @@ pub(in crate::path) struct Hit {
     /// Turns a density over solid angle at the light into one over area at the vertex before; for light from infinitely
     /// far, one over its disk.
     pub(in crate::path) jacobian: f64,
+}
+
+impl Hit {
+    fn start(&self) -> LightStart {
+        LightStart { next_event: self.next_event, is_hit: true }
+    }
 }
 
 /// Light of the environment where the ray leaves the scene.
@@ -128,7 +135,17 @@ fn deposit<S: Throughput<EyeState>, L: Throughput<LightState>>(
     }
     let weight = weight(walk, hit);
     let light = L::in_state(start, hit.radiance);
-    tally.deposit(rules, Receiver::Own, technique, &walk.carried, &light, Rgb::splat(weight as f32));
+    let factor = Rgb::splat(weight as f32);
+    tally.deposit(rules, Receiver::Own, technique, &walk.carried, &light, factor);
+    squares::deposit(rules, Receiver::Own, (&walk.carried, &light), factor, tally, || Made {
+        path: path(walk, hit),
+        ends: walk.ends(hit.start()),
+        s: technique.0,
+        cast: walk.cast,
+        weight,
+        survival: walk.survival.now,
+        from_eye: [walk.survival.before, walk.survival.now],
+    });
 }
 
 pub(in crate::path) fn weight<S: Throughput<EyeState>>(walk: &Walk<'_, EyeState, S>, hit: &Hit) -> f64 {
@@ -155,19 +172,20 @@ pub(in crate::path) fn weight<S: Throughput<EyeState>>(walk: &Walk<'_, EyeState,
             let emitted = f64::from(hit.emission.origin) * f64::from(hit.emission.emission);
             recursive::hit(*h, &walk.partial, hit.next_event, emitted)
         }
-        Weighing::Chosen(chosen) => {
-            let joint = Joint {
-                eye_end: f64::from(hit.emission.origin),
-                before_eye_end: f64::from(hit.emission.emission) * hit.jacobian,
-                ..Joint::default()
-            };
-            let mut links = walk.links.clone();
-            if links.len() < walk.scatterings as usize + 2 {
-                let forward = walk.edge.density.over_solid_angle();
-                links.push(Link { forward, reverse: 0.0, jacobian: hit.jacobian, specular: false });
-            }
-            let start = LightStart { next_event: hit.next_event, is_hit: true };
-            chosen.weight(&whole(&[], &links, joint), &walk.ends(start), 0)
-        }
+        Weighing::Chosen(chosen) => chosen.weight(&path(walk, hit), &walk.ends(hit.start()), 0),
     }
+}
+
+fn path<S: Throughput<EyeState>>(walk: &Walk<'_, EyeState, S>, hit: &Hit) -> Vec<PathDensity> {
+    let joint = Joint {
+        eye_end: f64::from(hit.emission.origin),
+        before_eye_end: f64::from(hit.emission.emission) * hit.jacobian,
+        ..Joint::default()
+    };
+    let mut links = walk.links.clone();
+    if links.len() < walk.scatterings as usize + 2 {
+        let forward = walk.edge.density.over_solid_angle();
+        links.push(Link { forward, reverse: 0.0, jacobian: hit.jacobian, specular: false });
+    }
+    whole(&[], &links, joint)
 }

@@ -1,13 +1,17 @@
 //! A vertex of an eye subpath joined to one of a light subpath.
 
 use crate::bsdf::event::Transport;
+use crate::math::colour::Rgb;
 use crate::math::cosine::squared_distance;
 use crate::path::connect::light_vertex::LightVertex;
+use crate::path::connect::squares::{self, Made};
 use crate::path::connect::unblocked;
 use crate::path::connect::whole::{Joint, whole};
 use crate::path::expression::language::{EyeState, LightState};
+use crate::path::mis::exhaustive::PathDensity;
 use crate::path::mis::recursive::{self, Bridge};
 use crate::path::rules::Weighing;
+use crate::path::survival::{Survival, to_the_light, turned};
 use crate::path::tally::{Receiver, Tally};
 use crate::path::throughput::Throughput;
 use crate::path::vertex::{Vertex, Weight};
@@ -38,8 +42,8 @@ pub fn join<S: Throughput<EyeState>, L: Throughput<LightState>>(
     }
     let towards = light.vertex.at.position - vertex.at.position;
     let Some(direction) = towards.try_normalize() else { return };
-    let (value, forward) = vertex.evaluate(direction, Transport::Radiance);
-    let eye = walk.carried.scattered(&rules.language, Weight::Smooth(value));
+    let (onto, forward) = vertex.evaluate(direction, Transport::Radiance);
+    let eye = walk.carried.scattered(&rules.language, Weight::Smooth(onto));
     if eye.total() == Vec3::ZERO {
         return;
     }
@@ -59,6 +63,38 @@ pub fn join<S: Throughput<EyeState>, L: Throughput<LightState>>(
     // Cosines are in the values.
     let factor = passes * (weight / squared) as f32;
     tally.deposit(rules, Receiver::Own, technique, &eye, &from_light, factor);
+    squares::deposit(rules, Receiver::Own, (&eye, &from_light), factor, tally, || {
+        let (onto, onto_eye) = (onto.total() / forward, value.total());
+        let (survival, from_eye) = survivals(walk, light, direction, [onto, onto_eye]);
+        let path = path(walk, light, &bridge(vertex, light, &between));
+        Made {
+            path,
+            ends: walk.ends(light.start),
+            s: technique.0,
+            cast: light.cast,
+            weight,
+            survival,
+            from_eye,
+        }
+    });
+}
+
+/// Roulette's probabilities of both subpaths, and of a whole path from the eye, which is multiplied by `onto` at the vertex of the eye
+/// subpath; `onto_eye` is f · |cos θ| of the light's vertex towards it.
+fn survivals<S: Throughput<EyeState>, L>(
+    walk: &Walk<'_, EyeState, S>,
+    light: &LightVertex<'_, L>,
+    direction: Vec3,
+    [onto, onto_eye]: [Rgb; 2],
+) -> (f64, [f64; 2]) {
+    let sure = Survival::SURE;
+    let behind = light.survival.as_deref().unwrap_or(&sure);
+    let cos = [-direction, light.vertex.back()].map(|direction| light.vertex.cos(direction));
+    let reverse = f64::from(light.vertex.reverse_pdf(-direction));
+    let joints = [onto, turned(onto_eye, [1.0, reverse], cos)];
+    let rest = joints.into_iter().chain(behind.turned.iter().rev().copied());
+    let from_eye = to_the_light(walk.throughput(), walk.scatterings, walk.survival.now, rest);
+    (walk.survival.now * behind.now, from_eye)
 }
 
 pub(in crate::path) fn weight<S: Throughput<EyeState>, L>(
@@ -67,25 +103,37 @@ pub(in crate::path) fn weight<S: Throughput<EyeState>, L>(
     light: &LightVertex<'_, L>,
     between: &Between,
 ) -> f64 {
-    let Between { direction, squared, pdfs } = *between;
-    let [forward, backward] = pdfs.map(f64::from);
-    let bridge = Bridge {
-        onto_light: forward * light.vertex.cos(direction) / squared,
-        light_reverse: f64::from(light.vertex.reverse_pdf(-direction)),
-        onto_eye: backward * vertex.cos(direction) / squared,
-        eye_reverse: f64::from(vertex.reverse_pdf(direction)),
-    };
+    let bridge = bridge(vertex, light, between);
     match &walk.rules.weighing {
         Weighing::FromEye | Weighing::ToLens | Weighing::Caustics => 0.0,
         Weighing::All(h) => recursive::join(*h, &light.partial, &walk.partial, &bridge),
         Weighing::Chosen(chosen) => {
-            let joint = Joint {
-                eye_end: bridge.onto_eye,
-                before_eye_end: bridge.eye_reverse * walk.links.last().map_or(0.0, |link| link.jacobian),
-                light_end: bridge.onto_light,
-                before_light_end: bridge.light_reverse * light.links.last().map_or(0.0, |link| link.jacobian),
-            };
-            chosen.weight(&whole(&light.links, &walk.links, joint), &walk.ends(light.start), light.vertices)
+            chosen.weight(&path(walk, light, &bridge), &walk.ends(light.start), light.vertices)
         }
     }
+}
+
+fn bridge<L>(vertex: &Vertex<'_>, light: &LightVertex<'_, L>, between: &Between) -> Bridge {
+    let Between { direction, squared, pdfs } = *between;
+    let [forward, backward] = pdfs.map(f64::from);
+    Bridge {
+        onto_light: forward * light.vertex.cos(direction) / squared,
+        light_reverse: f64::from(light.vertex.reverse_pdf(-direction)),
+        onto_eye: backward * vertex.cos(direction) / squared,
+        eye_reverse: f64::from(vertex.reverse_pdf(direction)),
+    }
+}
+
+fn path<S: Throughput<EyeState>, L>(
+    walk: &Walk<'_, EyeState, S>,
+    light: &LightVertex<'_, L>,
+    bridge: &Bridge,
+) -> Vec<PathDensity> {
+    let joint = Joint {
+        eye_end: bridge.onto_eye,
+        before_eye_end: bridge.eye_reverse * walk.links.last().map_or(0.0, |link| link.jacobian),
+        light_end: bridge.onto_light,
+        before_light_end: bridge.light_reverse * light.links.last().map_or(0.0, |link| link.jacobian),
+    };
+    whole(&light.links, &walk.links, joint)
 }

@@ -4,15 +4,17 @@ use crate::bsdf::event::Transport;
 use crate::math::colour::Rgb;
 use crate::math::cosine::{cosine, squared_distance};
 use crate::path::connect::light_vertex::LightStart;
+use crate::path::connect::squares::{self, Made};
 use crate::path::connect::unblocked;
 use crate::path::connect::whole::{Joint, whole};
 use crate::path::expression::language::{EyeState, LightState};
-use crate::path::mis::exhaustive::{Ends, Link};
+use crate::path::mis::exhaustive::{Ends, Link, PathDensity};
 use crate::path::mis::recursive;
 use crate::path::rules::{Rules, Weighing};
+use crate::path::survival::{to_the_light, turned};
 use crate::path::tally::{Receiver, Tally};
 use crate::path::throughput::Throughput;
-use crate::path::vertex::{Vertex, Weight};
+use crate::path::vertex::{Cast, Vertex, Weight};
 use crate::path::walk::{Sight, Walk};
 use crate::sampler::Use;
 use crate::scene::importance::{Importance, LensHit, Seen};
@@ -22,7 +24,7 @@ use glam::Vec3;
 pub fn to_lens<E: Throughput<EyeState>, L: Throughput<LightState>>(
     walk: &Walk<'_, LightState, L>,
     vertex: &Vertex<'_>,
-    start: LightStart,
+    (start, cast): (LightStart, Cast),
     tally: &mut Tally,
 ) {
     let technique = (walk.scatterings as usize + 2, 1);
@@ -45,12 +47,21 @@ pub fn to_lens<E: Throughput<EyeState>, L: Throughput<LightState>>(
     // The cosine at the vertex is in `value`.
     let importance = seen.pdf.over_area(squared, 1.0);
     let end = LensEnd::new(walk, vertex, &seen, squared, backward);
-    let weight = weight(walk, &end, start, f64::from(vertex.reverse_pdf(seen.direction)));
-    let share = importance / rules.light_paths;
+    let reverse = f64::from(vertex.reverse_pdf(seen.direction));
+    let weight = weight(walk, &end, start, reverse);
     let eye = E::in_state(rules.language.eye_start(), Vec3::ONE);
-    let factor = passes * (weight * share) as f32;
-    tally.deposit(rules, Receiver::Pixel(seen.pixel), technique, &eye, &light, factor);
-    tally.deposit_square(rules, seen.pixel, &eye, &light, (passes * share as f32, weight));
+    let factor = passes * (weight * (importance / rules.light_paths)) as f32;
+    let receiver = Receiver::Pixel(seen.pixel);
+    tally.deposit(rules, receiver, technique, &eye, &light, factor);
+    squares::deposit(rules, receiver, (&eye, &light), factor, tally, || Made {
+        path: path(walk, &end, reverse),
+        ends: walk.ends(start),
+        s: technique.0,
+        cast,
+        weight,
+        survival: walk.survival.now,
+        from_eye: from_eye(walk, vertex, &seen, (value.total(), reverse)),
+    });
 }
 
 /// Densities of an edge to the lens.
@@ -94,16 +105,38 @@ pub(in crate::path) fn weight<L: Throughput<LightState>>(
             recursive::to_lens(walk.rules.heuristic(), &walk.without_inner_joints(), from_eye, reverse)
         }
         Weighing::Chosen(chosen) => {
-            let lens = Link { forward: 1.0, reverse: 0.0, jacobian: 0.0, specular: false };
-            let joint = Joint {
-                eye_end: end.from_light,
-                before_eye_end: 0.0,
-                light_end: end.from_eye,
-                before_light_end: reverse * walk.links.last().map_or(0.0, |link| link.jacobian),
-            };
-            chosen.weight(&whole(&walk.links, &[lens], joint), &walk.ends(start), walk.links.len())
+            chosen.weight(&path(walk, end, reverse), &walk.ends(start), walk.links.len())
         }
     }
+}
+
+/// Roulette's probabilities of a whole path from the eye, where `value` and `reverse` are f · |cos θ| at its first surface and the density
+/// over solid angle with which it goes on from there.
+fn from_eye<L: Throughput<LightState>>(
+    walk: &Walk<'_, LightState, L>,
+    vertex: &Vertex<'_>,
+    seen: &Seen,
+    (value, reverse): (Rgb, f64),
+) -> [f64; 2] {
+    let cos = [seen.direction, vertex.back()].map(|direction| vertex.cos(direction));
+    let first = turned(value, [1.0, reverse], cos);
+    let rest = walk.survival.turned.iter().rev().copied();
+    to_the_light(Vec3::ONE, 0, 1.0, std::iter::once(first).chain(rest))
+}
+
+fn path<L: Throughput<LightState>>(
+    walk: &Walk<'_, LightState, L>,
+    end: &LensEnd,
+    reverse: f64,
+) -> Vec<PathDensity> {
+    let lens = Link { forward: 1.0, reverse: 0.0, jacobian: 0.0, specular: false };
+    let joint = Joint {
+        eye_end: end.from_light,
+        before_eye_end: 0.0,
+        light_end: end.from_eye,
+        before_light_end: reverse * walk.links.last().map_or(0.0, |link| link.jacobian),
+    };
+    whole(&walk.links, &[lens], joint)
 }
 
 /// A place that light starts from, seen by the lens itself.
@@ -142,23 +175,32 @@ pub fn light_to_lens<E: Throughput<EyeState>, L: Throughput<LightState>>(
         Weighing::ToLens => 1.0,
         Weighing::All(h) => recursive::light_to_lens(*h, from_eye / (rules.light_paths * shown.place)),
         Weighing::Chosen(chosen) => {
-            let light = Link { forward: shown.place, reverse: 0.0, jacobian: 0.0, specular: false };
-            let lens = Link { forward: 1.0, ..light };
-            let joint = Joint { light_end: from_eye, eye_end: shown.onto_lens, ..Joint::default() };
-            let ends = Ends {
-                next_event: shown.place,
-                light_is_hit: true,
-                lens: shown.lens,
-                light_paths: rules.light_paths,
-            };
-            chosen.weight(&whole(&[light], &[lens], joint), &ends, 1)
+            let (path, ends) = shown.path(rules);
+            chosen.weight(&path, &ends, 1)
         }
     };
-    let factor = weight * from_eye / rules.light_paths * f64::from(shown.passes);
+    let factor = Rgb::splat((weight * from_eye / rules.light_paths * f64::from(shown.passes)) as f32);
     let eye = E::in_state(rules.language.eye_start(), Vec3::ONE);
     let light = L::in_state(shown.state, shown.radiance);
     let receiver = Receiver::Pixel(shown.seen.pixel);
-    tally.deposit(rules, receiver, technique, &eye, &light, Rgb::splat(factor as f32));
+    tally.deposit(rules, receiver, technique, &eye, &light, factor);
+    squares::deposit(rules, receiver, (&eye, &light), factor, tally, || {
+        let (path, ends) = shown.path(rules);
+        let cast = Cast::Diffuse;
+        Made { path, ends, s: technique.0, cast, weight, survival: 1.0, from_eye: [1.0; 2] }
+    });
+}
+
+impl Shown {
+    fn path(&self, rules: &Rules) -> (Vec<PathDensity>, Ends) {
+        let light = Link { forward: self.place, reverse: 0.0, jacobian: 0.0, specular: false };
+        let lens = Link { forward: 1.0, ..light };
+        let light_end = self.seen.pdf.over_area(self.squared, self.cos);
+        let joint = Joint { light_end, eye_end: self.onto_lens, ..Joint::default() };
+        let light_paths = rules.light_paths;
+        let ends = Ends { next_event: self.place, light_is_hit: true, lens: self.lens, light_paths };
+        (whole(&[light], &[lens], joint), ends)
+    }
 }
 
 /// Adds light that meets the lens by itself. The image of a light without extent, straight or by ideally specular

@@ -3,7 +3,8 @@
 use crate::path::media::Media;
 use crate::path::mis::exhaustive::Link;
 use crate::path::mis::partial::Partial;
-use crate::path::vertex::Vertex;
+use crate::path::survival::Survival;
+use crate::path::vertex::{Cast, Vertex};
 
 /// A vertex of a light subpath that eye subpaths can be joined to.
 #[derive(Clone, Debug)]
@@ -18,6 +19,10 @@ pub struct LightVertex<'a, T> {
     pub media: Media,
     /// Vertices of the light subpath up to here, the light included.
     pub vertices: usize,
+    /// What the first surface makes of light.
+    pub cast: Cast,
+    /// What roulette has done up to here, where squares are told.
+    pub survival: Option<Box<Survival>>,
     /// All of them, where weights need that.
     pub links: Vec<Link>,
     /// How its light is found otherwise.

@@ -5,5 +5,6 @@ pub mod join;
 pub mod lens;
 pub mod light_vertex;
 pub mod next_event;
+pub mod squares;
 pub mod unblocked;
 pub mod whole;

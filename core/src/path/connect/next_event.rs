@@ -3,12 +3,14 @@
 use crate::bsdf::event::Transport;
 use crate::math::colour::Rgb;
 use crate::path::connect::light_vertex::LightStart;
+use crate::path::connect::squares::{self, Made};
 use crate::path::connect::unblocked;
 use crate::path::connect::whole::{Joint, whole};
 use crate::path::expression::language::{EyeState, LightState};
-use crate::path::mis::exhaustive::Link;
+use crate::path::mis::exhaustive::{Link, PathDensity};
 use crate::path::mis::recursive::{self, NextEventDensities};
 use crate::path::rules::Weighing;
+use crate::path::survival::to_the_light;
 use crate::path::tally::{Receiver, Tally};
 use crate::path::throughput::Throughput;
 use crate::path::vertex::{Cast, Vertex, Weight};
@@ -47,9 +49,24 @@ pub fn next_event<S: Throughput<EyeState>, L: Throughput<LightState>>(
         return;
     }
     let weight = weight(walk, vertex, light, &event, bsdf_pdf);
-    let light = L::in_state(start, event.radiance);
+    let from_light = L::in_state(start, event.radiance);
     let factor = passes * (weight as f32 / event.pdf);
-    tally.deposit(rules, Receiver::Own, technique, &eye, &light, factor);
+    tally.deposit(rules, Receiver::Own, technique, &eye, &from_light, factor);
+    squares::deposit(rules, Receiver::Own, (&eye, &from_light), factor, tally, || {
+        let around = Around::new(walk, vertex, light, &event);
+        let path = path(walk, vertex, &event, (&around, bsdf_pdf));
+        let hits =
+            to_the_light(walk.throughput(), walk.scatterings, walk.survival.now, [value.total() / bsdf_pdf]);
+        Made {
+            path,
+            ends: walk.ends(around.start(&event)),
+            s: technique.0,
+            cast: vertex.cast(),
+            weight,
+            survival: walk.survival.now,
+            from_eye: hits,
+        }
+    });
 }
 
 fn passes<S: Throughput<EyeState>>(
@@ -107,19 +124,28 @@ pub(in crate::path) fn weight<S: Throughput<EyeState>>(
         }
         Weighing::Chosen(chosen) => {
             let around = Around::new(walk, vertex, light, event);
-            let reverse = f64::from(vertex.reverse_pdf(event.direction));
-            let forward = f64::from(around.emission.origin);
-            let light = Link { forward, reverse: 0.0, jacobian: 0.0, specular: false };
-            let joint = Joint {
-                eye_end: around.first_edge,
-                before_eye_end: reverse * walk.links.last().map_or(0.0, |link| link.jacobian),
-                light_end: f64::from(bsdf_pdf) * around.to_light,
-                before_light_end: 0.0,
-            };
-            let start = LightStart { next_event: around.next_event, is_hit: event.found_by == FoundBy::Both };
-            chosen.weight(&whole(&[light], &walk.links, joint), &walk.ends(start), 1)
+            let path = path(walk, vertex, event, (&around, bsdf_pdf));
+            chosen.weight(&path, &walk.ends(around.start(event)), 1)
         }
     }
+}
+
+fn path<S: Throughput<EyeState>>(
+    walk: &Walk<'_, EyeState, S>,
+    vertex: &Vertex<'_>,
+    event: &NextEvent,
+    (around, bsdf_pdf): (&Around, f32),
+) -> Vec<PathDensity> {
+    let reverse = f64::from(vertex.reverse_pdf(event.direction));
+    let forward = f64::from(around.emission.origin);
+    let light = Link { forward, reverse: 0.0, jacobian: 0.0, specular: false };
+    let joint = Joint {
+        eye_end: around.first_edge,
+        before_eye_end: reverse * walk.links.last().map_or(0.0, |link| link.jacobian),
+        light_end: f64::from(bsdf_pdf) * around.to_light,
+        before_light_end: 0.0,
+    };
+    whole(&[light], &walk.links, joint)
 }
 
 /// Densities around a next event.
@@ -159,5 +185,9 @@ impl Around {
             FoundBy::NextEvent => f64::from(event.pdf),
         };
         Self { emission, next_event, first_edge: f64::from(emission.emission) * cos / squared, to_light }
+    }
+
+    fn start(&self, event: &NextEvent) -> LightStart {
+        LightStart { next_event: self.next_event, is_hit: event.found_by == FoundBy::Both }
     }
 }

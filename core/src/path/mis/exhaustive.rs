@@ -114,3 +114,25 @@ pub fn log_density(path: &[PathDensity], ends: &Ends, s: usize) -> f64 {
         _ => sum,
     }
 }
+
+/// [`log_density`] of all techniques that do not hit the lens, by how many vertices they have from the light, at once; −∞ of those
+/// that cannot make the path.
+pub fn log_densities(path: &[PathDensity], ends: &Ends) -> Vec<f64> {
+    let k = path.len();
+    let mut sums = vec![0.0; k];
+    for i in (0..k - 1).rev() {
+        sums[i] = sums[i + 1] + libm::log(path[i].from_eye);
+    }
+    if !ends.light_is_hit {
+        sums[0] = f64::NEG_INFINITY;
+    }
+    let mut light = libm::log(path[0].from_light);
+    for s in 1..k {
+        let to_lens = if s == k - 1 { libm::log(ends.light_paths) } else { 0.0 };
+        let ended = if s == 1 && k > 2 { libm::log(ends.next_event) } else { light };
+        let joined = !path[s - 1].specular && !path[s].specular;
+        sums[s] = if joined { sums[s] + ended + to_lens } else { f64::NEG_INFINITY };
+        light += libm::log(path[s].from_light);
+    }
+    sums
+}

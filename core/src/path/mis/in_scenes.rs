@@ -284,6 +284,8 @@ impl<'a> Path<'a> {
             partial: light_walk.partial,
             media: light_walk.media,
             vertices: s,
+            cast: light.cast(),
+            survival: None,
             links: Vec::new(),
             start: walked.start,
         };

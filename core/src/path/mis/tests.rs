@@ -1,6 +1,6 @@
 //! Random paths: the recursion against all densities written out.
 
-use super::exhaustive::{Chosen, Ends, PathDensity, is_able};
+use super::exhaustive::{Chosen, Ends, PathDensity, is_able, log_densities, log_density};
 use super::heuristic::Heuristic;
 use super::partial::Partial;
 use super::recursive::{self, Bridge, NextEventDensities};
@@ -201,6 +201,12 @@ fn check(count: usize, narrow: bool, seed: u32) {
         Numbers { sampler: Sampler::new(5, 0, [count as u32, u32::from(narrow)], seed), next: 0 };
     let path = random(count, narrow, &mut numbers);
     let (densities, ends) = path.densities();
+    for (s, at_once) in log_densities(&densities, &ends).into_iter().enumerate() {
+        let able = is_able(&densities, &ends, s);
+        let one = if able { log_density(&densities, &ends, s) } else { f64::NEG_INFINITY };
+        let close = (at_once - one).abs() <= 1e-12 * (1.0 + one.abs()) || at_once == one;
+        assert!(close, "{count} s = {s}: {at_once} {one}");
+    }
     for (h, weights) in [(Heuristic::Balance, Weights::Balance), (Heuristic::Power, Weights::Power)] {
         let chosen = Chosen::new(Vec::new(), weights);
         let (light, eye) = (path.light_partials(h), path.eye_partials(h));
