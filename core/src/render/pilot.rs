@@ -162,8 +162,8 @@ pub struct Trial {
     pub relative_error: f64,
     /// Standard error of its square, by a jackknife over the sequences.
     pub square_error: f64,
-    /// Relative error to be expected of as many samples. What `path` and `caustics` add to a pixel may be large and so rare that their own
-    /// samples have not met it, or too much of it, where those of `bidirectional` meet it often.
+    /// Relative error to be expected of as many samples. What `path`, `caustics` and `light` add to a pixel may be large and so rare that
+    /// their own samples have not met it, or too much of it, where those of `bidirectional` meet it often.
     #[serde(default)]
     pub expected_error: f64,
     /// Relative error by light that another method has met and this one has not, where nothing else tells of it.

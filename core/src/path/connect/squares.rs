@@ -34,23 +34,27 @@ impl Made {
     fn factor(&self, densities: &[f64], method: Method) -> f64 {
         let k = densities.len();
         let is_of = |s: usize| match method {
-            Method::Path => s <= 1,
-            Method::Light => s == k - 1,
-            Method::Caustics => s <= 1 || s == k - 1 && self.cast == Cast::Caustic,
+            Method::Path => s <= 1 && k - s >= 2,
+            Method::Light => k - s == 1,
+            Method::Caustics => s <= 1 && k - s >= 2 || s >= 2 && k - s == 1 && self.cast == Cast::Caustic,
             Method::Bidirectional | Method::Photon | Method::Radiosity => true,
         };
-        let (mut share, mut dearer) = (0.0, 0.0);
-        for s in (0..k).filter(|s| is_of(*s) && densities[*s] > f64::NEG_INFINITY) {
-            let part = libm::exp(densities[s] - densities[self.s]) * self.weight;
-            share += part;
-            dearer += part
-                / match s {
-                    0 => self.from_eye[1],
-                    1 => self.from_eye[0],
-                    _ => 1.0,
+        // Over the density of the technique that made the path.
+        let (mut all, mut own, mut dearer) = (0.0, 0.0, 0.0);
+        for s in (0..k).filter(|s| densities[*s] > f64::NEG_INFINITY) {
+            let density = libm::exp(densities[s] - densities[self.s]);
+            all += density;
+            if is_of(s) {
+                own += density;
+                dearer += match s {
+                    0 => density / self.from_eye[1],
+                    1 => density / self.from_eye[0],
+                    _ => density,
                 };
+            }
         }
-        let factor = self.survival * dearer / (share * share);
+        // Other weights than those of the balance heuristic are taken back.
+        let factor = self.survival * dearer * all / (own * own) / (self.weight * all).powi(2);
         if factor.is_finite() { factor } else { 0.0 }
     }
 }
