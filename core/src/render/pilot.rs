@@ -40,6 +40,8 @@ const TRIANGLES_MAX: u64 = 1 << 20;
 const PATH_RAYS_MAX: f64 = 64.0;
 /// Work of a pilot, at most, in microseconds of a thread: one who submits a job waits for it, and sees its picture first.
 const WORK_MAX: f64 = 2e6;
+/// Work over the least that is about the least.
+const ABOUT: f64 = 1.1;
 /// Methods that `bidirectional` tells of.
 const TOLD: [Method; 3] = [Method::Path, Method::Caustics, Method::Light];
 /// Time of a pilot over that of as many samples in a job: what it is told costs as much again as half of the paths (cornell-box: 1.5).
@@ -136,7 +138,7 @@ pub enum NoPilot {
 /// What was tried.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Pilot {
-    /// The method that needs the least work for an error: the first, where no other is clearly better.
+    /// Of the methods that need about the least work for an error, the one with the cheapest samples.
     pub method: Method,
     /// The size of the frames that were tried.
     pub size: Size,
@@ -185,10 +187,12 @@ impl Trial {
     }
 }
 
-/// The trial to go by: the first of those that need the least work.
+/// The trial to go by: of those that need about the least work, the first with the cheapest samples. What no pilot has met is the same for
+/// all that come to it by chance, and costs those with dear samples the more.
 fn chosen(trials: &[Trial]) -> &Trial {
-    let least = trials.iter().min_by(|a, b| a.cost().total_cmp(&b.cost()));
-    least.expect("each method of a plan was tried")
+    let least = trials.iter().map(Trial::cost).fold(f64::INFINITY, f64::min);
+    let about_least = trials.iter().filter(|trial| trial.cost() <= ABOUT * least);
+    about_least.min_by(|a, b| a.work.total_cmp(&b.work)).expect("each method of a plan was tried")
 }
 
 /// A sample in samples of `path`, where nothing is known yet.

@@ -165,6 +165,11 @@ fn reason(pilot: &Pilot) -> String {
         })
         .collect();
     let others = others.join(", ");
+    if pilot.trials.iter().any(|trial| trial.time_ratio < 1.0) {
+        return format!(
+            "it needs about the least time for an error in a pilot, with the cheapest samples: {others} of its"
+        );
+    }
     format!("it needs the least time for an error in a pilot: {others} of its")
 }
 
