@@ -40,8 +40,9 @@ const TRIANGLES_MAX: u64 = 1 << 20;
 const PATH_RAYS_MAX: f64 = 64.0;
 /// Work of a pilot, at most, in microseconds of a thread: one who submits a job waits for it, and sees its picture first.
 const WORK_MAX: f64 = 2e6;
-/// Work over the least that is about the least.
+/// Work over the least that is about the least, in pilots of so many pixels; smaller ones do not tell that well.
 const ABOUT: f64 = 1.1;
+const ABOUT_FROM: u64 = 1000;
 /// Methods that `bidirectional` tells of.
 const TOLD: [Method; 3] = [Method::Path, Method::Caustics, Method::Light];
 /// Time of a pilot over that of as many samples in a job: what it is told costs as much again as half of the paths (cornell-box: 1.5).
@@ -189,9 +190,10 @@ impl Trial {
 
 /// The trial to go by: of those that need about the least work, the first with the cheapest samples. What no pilot has met is the same for
 /// all that come to it by chance, and costs those with dear samples the more.
-fn chosen(trials: &[Trial]) -> &Trial {
+fn chosen(trials: &[Trial], pixels: u64) -> &Trial {
     let least = trials.iter().map(Trial::cost).fold(f64::INFINITY, f64::min);
-    let about_least = trials.iter().filter(|trial| trial.cost() <= ABOUT * least);
+    let about = if pixels < ABOUT_FROM { least } else { ABOUT * least };
+    let about_least = trials.iter().filter(|trial| trial.cost() <= about);
     about_least.min_by(|a, b| a.work.total_cmp(&b.work)).expect("each method of a plan was tried")
 }
 
@@ -393,7 +395,7 @@ impl Trying<'_> {
         let share = (TELLING * self.spent() / self.job_work(job)).min(f64::MAX);
         let trials = self.trials();
         let (method, least) = {
-            let chosen = chosen(&trials);
+            let chosen = chosen(&trials, self.region.pixels());
             (chosen.method, chosen.cost())
         };
         let mut pilot = Pilot { method, size, trials, share };
@@ -433,4 +435,35 @@ fn spread(relative: &RelativeTo, lanes: &[Prefix]) -> f64 {
     let r = without.len() as f64;
     let mean = without.iter().sum::<f64>() / r;
     ((r - 1.0) / r * without.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>()).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_methods_that_are_about_as_good_the_one_with_the_cheapest_samples_is_taken() {
+        let trial = |method, work: f64, cost: f64| Trial {
+            method,
+            samples: 8,
+            rays: 1,
+            work,
+            relative_error: 1.0,
+            square_error: 0.1,
+            expected_error: (cost / work).sqrt(),
+            missed: 0.0,
+            time_ratio: 1.0,
+        };
+        let with = |light: f64| {
+            vec![
+                trial(Method::Bidirectional, 4.0, 1.0),
+                trial(Method::Caustics, 2.0, 1.09),
+                trial(Method::Light, 1.0, light),
+            ]
+        };
+        assert_eq!(chosen(&with(1.11), ABOUT_FROM).method, Method::Caustics);
+        assert_eq!(chosen(&with(1.09), ABOUT_FROM).method, Method::Light);
+        assert_eq!(chosen(&with(1.11), ABOUT_FROM - 1).method, Method::Bidirectional);
+        assert_eq!(chosen(&with(f64::NAN), ABOUT_FROM).method, Method::Caustics);
+    }
 }

@@ -66,7 +66,8 @@ impl Made {
 ///
 /// Roulette lets the subpaths of technique i come so far with the probability qᵢ, and what is added is the more: the mean of the square is
 /// ∫ f²/(wP) Σ (wᵢ/w)/qᵢ, the sum over the method's techniques, and that of (f/(qP))² q/w Σ (wᵢ/w)/qᵢ over all, q the one that made it.
-/// Light subpaths of the method are taken for sure.
+/// Light subpaths of the method are taken for sure, and lamps that are seen directly are left out: their noise is that of edges, of which
+/// a pilot has more than its job. Measured in a Cornell box, 84 pixels: with them `path` seemed to need half as much again.
 #[inline(always)]
 pub fn deposit(
     rules: &Rules,
@@ -97,6 +98,9 @@ fn deposit_in(
     };
     if matches!(rules.weighing, Weighing::All(_)) {
         let made = made();
+        if made.path.len() == 2 {
+            return;
+        }
         let densities = log_densities(&made.path, &made.ends);
         rules
             .square_planes()
