@@ -42,7 +42,7 @@ const PATH_RAYS_MAX: f64 = 64.0;
 const WORK_MAX: f64 = 2e6;
 /// Work over the least that is about the least, in pilots of so many pixels; smaller ones do not tell that well.
 const ABOUT: f64 = 1.1;
-const ABOUT_FROM: u64 = 1000;
+const ABOUT_FROM: usize = 1000;
 /// Methods that `bidirectional` tells of.
 const TOLD: [Method; 3] = [Method::Path, Method::Caustics, Method::Light];
 /// Time of a pilot over that of as many samples in a job: what it is told costs as much again as half of the paths (cornell-box: 1.5).
@@ -190,7 +190,7 @@ impl Trial {
 
 /// The trial to go by: of those that need about the least work, the first with the cheapest samples. What no pilot has met is the same for
 /// all that come to it by chance, and costs those with dear samples the more.
-fn chosen(trials: &[Trial], pixels: u64) -> &Trial {
+fn chosen(trials: &[Trial], pixels: usize) -> &Trial {
     let least = trials.iter().map(Trial::cost).fold(f64::INFINITY, f64::min);
     let about = if pixels < ABOUT_FROM { least } else { ABOUT * least };
     let about_least = trials.iter().filter(|trial| trial.cost() <= about);
