@@ -78,8 +78,7 @@ fn under_a_large_lamp() -> Vec<u8> {
 fn squares(glb: &[u8], of: Method, by: Method, bounces: Option<u32>) -> Vec<f64> {
     const ROUNDS: u32 = 2000;
     let layers = vec![Layer { name: "squares".to_owned(), shows: Shows::Squares(of) }];
-    let paths = "L(D|S)+E".to_owned();
-    let settings = Settings { method: by, layers, bounces, paths, ..settings(24, 16, ROUNDS) };
+    let settings = Settings { method: by, layers, bounces, ..settings(24, 16, ROUNDS) };
     let scene = scene(glb, &settings);
     let mean = |replicate: u32| {
         let block = Block { index: 0, start: 0, count: 1 };

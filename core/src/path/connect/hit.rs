@@ -137,7 +137,7 @@ fn deposit<S: Throughput<EyeState>, L: Throughput<LightState>>(
     let light = L::in_state(start, hit.radiance);
     let factor = Rgb::splat(weight as f32);
     tally.deposit(rules, Receiver::Own, technique, &walk.carried, &light, factor);
-    squares::deposit(rules, Receiver::Own, (&walk.carried, &light), factor, tally, || Made {
+    squares::deposit(rules, (Receiver::Own, technique), (&walk.carried, &light), factor, tally, || Made {
         path: path(walk, hit),
         ends: walk.ends(hit.start()),
         s: technique.0,

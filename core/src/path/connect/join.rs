@@ -63,7 +63,7 @@ pub fn join<S: Throughput<EyeState>, L: Throughput<LightState>>(
     // Cosines are in the values.
     let factor = passes * (weight / squared) as f32;
     tally.deposit(rules, Receiver::Own, technique, &eye, &from_light, factor);
-    squares::deposit(rules, Receiver::Own, (&eye, &from_light), factor, tally, || {
+    squares::deposit(rules, (Receiver::Own, technique), (&eye, &from_light), factor, tally, || {
         let (onto, onto_eye) = (onto.total() / forward, value.total());
         let (survival, from_eye) = survivals(walk, light, direction, [onto, onto_eye]);
         let path = path(walk, light, &bridge(vertex, light, &between));

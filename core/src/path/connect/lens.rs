@@ -53,7 +53,7 @@ pub fn to_lens<E: Throughput<EyeState>, L: Throughput<LightState>>(
     let factor = passes * (weight * (importance / rules.light_paths)) as f32;
     let receiver = Receiver::Pixel(seen.pixel);
     tally.deposit(rules, receiver, technique, &eye, &light, factor);
-    squares::deposit(rules, receiver, (&eye, &light), factor, tally, || Made {
+    squares::deposit(rules, (receiver, technique), (&eye, &light), factor, tally, || Made {
         path: path(walk, &end, reverse),
         ends: walk.ends(start),
         s: technique.0,
@@ -184,11 +184,6 @@ pub fn light_to_lens<E: Throughput<EyeState>, L: Throughput<LightState>>(
     let light = L::in_state(shown.state, shown.radiance);
     let receiver = Receiver::Pixel(shown.seen.pixel);
     tally.deposit(rules, receiver, technique, &eye, &light, factor);
-    squares::deposit(rules, receiver, (&eye, &light), factor, tally, || {
-        let (path, ends) = shown.path(rules);
-        let cast = Cast::Diffuse;
-        Made { path, ends, s: technique.0, cast, weight, survival: 1.0, from_eye: [1.0; 2] }
-    });
 }
 
 impl Shown {

@@ -52,7 +52,7 @@ pub fn next_event<S: Throughput<EyeState>, L: Throughput<LightState>>(
     let from_light = L::in_state(start, event.radiance);
     let factor = passes * (weight as f32 / event.pdf);
     tally.deposit(rules, Receiver::Own, technique, &eye, &from_light, factor);
-    squares::deposit(rules, Receiver::Own, (&eye, &from_light), factor, tally, || {
+    squares::deposit(rules, (Receiver::Own, technique), (&eye, &from_light), factor, tally, || {
         let around = Around::new(walk, vertex, light, &event);
         let path = path(walk, vertex, &event, (&around, bsdf_pdf));
         let hits =

@@ -4,7 +4,7 @@ use crate::math::colour::Rgb;
 use crate::path::expression::language::{EyeState, LightState};
 use crate::path::mis::exhaustive::{Ends, PathDensity, log_densities};
 use crate::path::rules::{Rules, Weighing};
-use crate::path::tally::{Receiver, Tally};
+use crate::path::tally::{Receiver, Tally, Technique};
 use crate::path::throughput::Throughput;
 use crate::path::vertex::Cast;
 use crate::settings::Method;
@@ -66,18 +66,20 @@ impl Made {
 ///
 /// Roulette lets the subpaths of technique i come so far with the probability qᵢ, and what is added is the more: the mean of the square is
 /// ∫ f²/(wP) Σ (wᵢ/w)/qᵢ, the sum over the method's techniques, and that of (f/(qP))² q/w Σ (wᵢ/w)/qᵢ over all, q the one that made it.
-/// Light subpaths of the method are taken for sure, and lamps that are seen directly are left out: their noise is that of edges, of which
-/// a pilot has more than its job. Measured in a Cornell box, 84 pixels: with them `path` seemed to need half as much again.
+/// Light subpaths of the method are taken for sure. Lamps and skies that are seen directly are left out everywhere: they are the same
+/// large squares by every method.
 #[inline(always)]
 pub fn deposit(
     rules: &Rules,
-    receiver: Receiver,
+    (receiver, technique): (Receiver, Technique),
     ends: (&impl Throughput<EyeState>, &impl Throughput<LightState>),
     factor: Rgb,
     tally: &mut Tally,
     made: impl FnOnce() -> Made,
 ) {
-    if let [first, ..] = rules.square_planes() {
+    if let [first, ..] = rules.square_planes()
+        && technique.0 + technique.1 > 2
+    {
         deposit_in(rules, (receiver, first.1), ends, factor, tally, made);
     }
 }
@@ -98,9 +100,6 @@ fn deposit_in(
     };
     if matches!(rules.weighing, Weighing::All(_)) {
         let made = made();
-        if made.path.len() == 2 {
-            return;
-        }
         let densities = log_densities(&made.path, &made.ends);
         rules
             .square_planes()
