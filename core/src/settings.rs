@@ -161,6 +161,8 @@ pub enum Shows {
     Strategy(Strategy),
     /// The picture of `photon` with half the area of gathering: the difference tells its bias.
     Narrow,
+    /// The picture without lamps and skies that are seen directly.
+    Scattered,
     /// Squares of what a method adds to a pixel, path by path: in a picture of that method as its own samples find them, and in one of
     /// `bidirectional` as all techniques do, also before that method's have met some of the light.
     Squares(Method),
@@ -173,6 +175,7 @@ impl fmt::Display for Shows {
             Self::Paths(paths) => f.write_str(paths),
             Self::Strategy(Strategy { s, t }) => write!(f, "({s},{t})"),
             Self::Narrow => f.write_str("half the area of gathering"),
+            Self::Scattered => f.write_str("light that is scattered"),
             Self::Squares(method) => write!(f, "squares of what {} adds", method.name()),
         }
     }

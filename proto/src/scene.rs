@@ -61,6 +61,9 @@ pub struct SceneContents {
     pub materials: u32,
     /// Textures.
     pub textures: u32,
+    /// Pixels of their images, of which each counts once.
+    #[serde(default)]
+    pub pixels: u64,
     /// Cameras, by name, in the order of their numbers.
     pub cameras: Vec<String>,
     /// Width over height of the first camera, where it says.

@@ -11,7 +11,7 @@ use ovtigre_core::{
     film::{allocation::Allocations, size::Region},
     path::reach::Unreachable,
     radiosity::report::RadiosityReport,
-    render::pilot::Pilot,
+    render::pilot::report::Pilot,
     settings::Settings,
 };
 use schemars::JsonSchema;

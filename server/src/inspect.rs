@@ -59,6 +59,7 @@ pub fn contents(found: Contents) -> SceneContents {
         instances: report.instances as u32,
         materials: report.materials as u32,
         textures: report.textures as u32,
+        pixels: report.pixels,
         cameras: report.camera_names,
         variants: report.variants,
         aspect_ratio: aspects.first().copied().flatten(),

@@ -5,7 +5,11 @@ use ovtigre_core::{
     film::batch::{Batch, Block},
     render::{
         batch::render,
-        pilot::{Chance, NoPilot, Pilot, Plan, pilot},
+        pilot::{
+            plan::{Chance, NoPilot, Plan},
+            report::Pilot,
+            trying::pilot,
+        },
         progress::Progress,
     },
     settings::{Layer, Method, Settings, Shows},
@@ -29,7 +33,17 @@ fn plan_of([width, height]: [u32; 2], methods: &[Method], samples: u32) -> Plan 
     let settings = settings(width, height, 4);
     let region = settings.size.frame();
     let (methods, chance) = (methods.to_vec(), Chance::Sometimes);
-    Plan { settings, region, samples, error_target: None, seconds: None, triangles: 5000, chance, methods }
+    Plan {
+        settings,
+        region,
+        samples,
+        error_target: None,
+        seconds: None,
+        triangles: 5000,
+        pixels: 0,
+        chance,
+        methods,
+    }
 }
 
 fn tried(glb: &[u8], plan: &Plan, threads: usize) -> Pilot {
@@ -42,7 +56,10 @@ const THREE: [Method; 3] = [Method::Path, Method::Bidirectional, Method::Caustic
 
 #[test]
 fn each_scene_gets_the_method_that_is_good_at_it() {
-    // The job of the table in docs/PERFORMANCE.md.
+    // Jobs of the tables in docs/PERFORMANCE.md.
+    let small = Plan { chance: Chance::Never, triangles: 50, ..plan_of([128, 72], &ALL, 64) };
+    let found = tried(&two_rooms(), &small, 2);
+    assert_eq!(found.method, Method::Bidirectional, "{found:?}");
     let job = |methods: &[Method]| plan_of([480, 270], methods, 256);
     let diffuse = Plan { chance: Chance::Never, ..job(&ALL) };
     let found = tried(&cornell(), &diffuse, 2);
@@ -90,6 +107,20 @@ fn squares(glb: &[u8], of: Method, by: Method, bounces: Option<u32>) -> Vec<f64>
     (0..ROUNDS).into_par_iter().map(mean).collect()
 }
 
+#[test]
+fn light_that_is_scattered_is_the_picture_without_lamps_that_are_seen_directly() {
+    let (glb, both) = (cornell(), [Shows::Paths("L(D|S)+E".to_owned()), Shows::Scattered]);
+    for method in [Method::Path, Method::Bidirectional, Method::Light] {
+        let layers = both.clone().map(|shows| Layer { name: shows.to_string(), shows }).to_vec();
+        let settings = Settings { method, layers, ..settings(32, 32, 1) };
+        let block = Block { index: 0, start: 0, count: 4 };
+        let batch = Batch { region: settings.size.frame(), replicate: 0, block };
+        let planes = render(&scene(&glb, &settings), &settings, batch, &Progress::new()).unwrap().planes;
+        assert_eq!(planes[1], planes[2], "{method:?}");
+        assert_ne!(planes[0], planes[2], "{method:?}: the lamp is in the picture");
+    }
+}
+
 /// Its mean, and the standard error of that.
 fn mean(of: &[f64]) -> (f64, f64) {
     let count = of.len() as f64;
@@ -133,6 +164,7 @@ fn a_pilot_takes_little_of_what_is_asked_for() {
         (Plan { samples: 4, ..plan(&ALL, 1) }, "too small"),
         (Plan { seconds: Some(0.1), ..plan(&ALL, 4096) }, "too small"),
         (Plan { triangles: 1 << 21, ..plan(&ALL, 1 << 20) }, "reading the scene once more"),
+        (Plan { pixels: 1 << 24, ..plan(&ALL, 256) }, "reading the scene once more"),
     ] {
         let refused: NoPilot = pilot(&glb[..], None, &change).unwrap_err();
         assert!(refused.to_string().contains(why), "{refused}");

@@ -1,6 +1,7 @@
 //! Light that one picture shows and another one of the same has not met yet.
 
 use super::{append::Prefix, error::EPSILON};
+use std::borrow::Borrow;
 
 /// Blocks along the longer side of a picture, in which pictures are compared: more of them would have more noise, fewer would hide what
 /// is missed among what is not.
@@ -14,7 +15,7 @@ type Blocks = Vec<(f64, f64)>;
 /// Spread does not tell of light that no sample has met. Blocks of pixels that are darker than in another method's picture, by more
 /// than the spread of both explains, do: √(mean over blocks of \[max(0, m' − m)² − max(v', (v + v')/2)\] / (m'² + ε Ȳ²)), m and v
 /// mean and variance of a block, those of the other picture primed. It is 0 in the mean where both have met the same light.
-pub fn missed(seen: &[Prefix], other: &[Prefix]) -> f64 {
+pub fn missed<P: Borrow<Prefix>>(seen: &[P], other: &[P]) -> f64 {
     let (seen, other) = (blocks(seen), blocks(other));
     let count = other.len() as f64;
     let mean = other.iter().map(|(mean, _)| mean).sum::<f64>() / count;
@@ -26,8 +27,8 @@ pub fn missed(seen: &[Prefix], other: &[Prefix]) -> f64 {
     (squares.sum::<f64>() / count).max(0.0).sqrt()
 }
 
-fn blocks(replicates: &[Prefix]) -> Blocks {
-    let all: Vec<Vec<f64>> = replicates.iter().map(means).collect();
+fn blocks(replicates: &[impl Borrow<Prefix>]) -> Blocks {
+    let all: Vec<Vec<f64>> = replicates.iter().map(|one| means(one.borrow())).collect();
     let r = all.len() as f64;
     (0..all[0].len())
         .map(|block| {

@@ -4,6 +4,7 @@ use super::{
     append::Prefix,
     error::{EPSILON, window_mean},
 };
+use std::borrow::Borrow;
 
 /// Squares over those of the light around: each pixel's over Y² + ε Ȳ², Y the 3×3 mean luminance of a picture, as in
 /// [`estimate`](super::error::estimate).
@@ -14,10 +15,11 @@ pub struct RelativeTo {
 
 impl RelativeTo {
     /// To the mean of the replicates of a picture.
-    pub fn new(seen: &[Prefix]) -> Self {
-        let region = seen[0].region();
+    pub fn new(seen: &[impl Borrow<Prefix>]) -> Self {
+        let region = seen[0].borrow().region();
         let (width, height) = (region.width as usize, region.height as usize);
-        let mean = |i: usize| mean(seen, 0, i);
+        let picture = Plane::of(seen, 0);
+        let mean = |i: usize| picture.mean(i);
         let luminance: Vec<f64> = (0..region.pixels())
             .map(|i| 0.2126 * mean(3 * i) + 0.7152 * mean(3 * i + 1) + 0.0722 * mean(3 * i + 2))
             .collect();
@@ -31,18 +33,20 @@ impl RelativeTo {
     }
 
     /// Mean square of a sample, where the plane `plane` of replicates of the same picture holds squares.
-    pub fn square(&self, told: &[Prefix], plane: usize) -> f64 {
-        self.mean(|i| mean(told, plane, i))
+    pub fn square(&self, told: &[impl Borrow<Prefix>], plane: usize) -> f64 {
+        let told = Plane::of(told, plane);
+        self.mean(|i| told.mean(i))
     }
 
-    /// Variance of a sample, by the spread of replicates of the same picture that have as many samples each.
-    pub fn variance(&self, replicates: &[Prefix]) -> f64 {
+    /// Variance of a sample in the plane `plane`, by the spread of replicates of the same picture that have as many samples each.
+    pub fn variance(&self, replicates: &[impl Borrow<Prefix>], plane: usize) -> f64 {
+        let seen = Plane::of(replicates, plane);
         let count = replicates.len() as f64;
-        let samples = f64::from(replicates[0].samples());
+        let samples = seen.samples / count;
         self.mean(|i| {
-            let mean = mean(replicates, 0, i);
-            let deviation = |one: &Prefix| one.layer(0)[i] / samples - mean;
-            replicates.iter().map(|one| deviation(one).powi(2)).sum::<f64>() / (count - 1.0) * samples
+            let mean = seen.mean(i);
+            let deviation = |sums: &&[f64]| sums[i] / samples - mean;
+            seen.sums.iter().map(|one| deviation(one).powi(2)).sum::<f64>() / (count - 1.0) * samples
         })
     }
 
@@ -54,10 +58,23 @@ impl RelativeTo {
     }
 }
 
-/// Mean of a channel of a pixel over all samples of several replicates.
-fn mean(replicates: &[Prefix], plane: usize, i: usize) -> f64 {
-    let samples: f64 = replicates.iter().map(|one| f64::from(one.samples())).sum();
-    replicates.iter().map(|one| one.layer(plane)[i]).sum::<f64>() / samples
+/// A plane of several replicates.
+struct Plane<'a> {
+    sums: Vec<&'a [f64]>,
+    /// Of all replicates.
+    samples: f64,
+}
+
+impl<'a> Plane<'a> {
+    fn of(replicates: &'a [impl Borrow<Prefix>], plane: usize) -> Self {
+        let sums = replicates.iter().map(|one| one.borrow().layer(plane)).collect();
+        Self { sums, samples: replicates.iter().map(|one| f64::from(one.borrow().samples())).sum() }
+    }
+
+    /// Mean of a channel of a pixel over all samples.
+    fn mean(&self, i: usize) -> f64 {
+        self.sums.iter().map(|sums| sums[i]).sum::<f64>() / self.samples
+    }
 }
 
 #[cfg(test)]
@@ -98,6 +115,6 @@ mod tests {
         // 1 and 2 are 3/2 ± √½ in half of the pixels; at the edge the light around is 1 of 3/2, and beyond it 1/2.
         let at = |light: f64| 1.0 / (light * light + 0.01 * 0.75 * 0.75);
         let expected = (3.0 * at(1.5) + at(1.0)) / 8.0 * 0.5 * f64::from(all[0].samples());
-        assert!((RelativeTo::new(&all).variance(&all) / expected - 1.0).abs() < 1e-7);
+        assert!((RelativeTo::new(&all).variance(&all, 0) / expected - 1.0).abs() < 1e-7);
     }
 }

@@ -45,6 +45,7 @@ pub struct Rules {
     /// The plane of each technique that has one.
     technique_planes: Vec<(Technique, usize)>,
     narrow_plane: Option<usize>,
+    scattered_plane: Option<usize>,
     square_planes: Vec<(Method, usize)>,
     /// What a material does to light, by its number; `None` where textures tell.
     even: Vec<Option<Bsdf>>,
@@ -73,7 +74,7 @@ impl Rules {
     pub fn new(scene: &Scene, settings: &Settings, pixels: usize) -> Result<Self, ExpressionError> {
         let mut expressions = vec![settings.paths.as_str()];
         let (mut rule_planes, mut technique_planes) = (vec![0], Vec::new());
-        let (mut narrow_plane, mut square_planes) = (None, Vec::new());
+        let (mut narrow_plane, mut scattered_plane, mut square_planes) = (None, None, Vec::new());
         for (i, layer) in settings.layers.iter().enumerate() {
             match &layer.shows {
                 Shows::Paths(paths) => {
@@ -84,6 +85,7 @@ impl Rules {
                     technique_planes.push(((*s as usize, *t as usize), i + 1));
                 }
                 Shows::Narrow => narrow_plane = Some(i + 1),
+                Shows::Scattered => scattered_plane = Some(i + 1),
                 Shows::Squares(method) => square_planes.push((*method, i + 1)),
             }
         }
@@ -104,6 +106,7 @@ impl Rules {
             rule_planes,
             technique_planes,
             narrow_plane,
+            scattered_plane,
             square_planes,
             media_of_eye: scene.eye().map(|eye| Media::around(scene, eye, Moment::STILL, &mut 0)),
         })
@@ -122,13 +125,19 @@ impl Rules {
 
     /// Number of pictures.
     pub fn planes(&self) -> usize {
-        let further = usize::from(self.narrow_plane.is_some()) + self.square_planes.len();
+        let single = [self.narrow_plane, self.scattered_plane];
+        let further = single.iter().flatten().count() + self.square_planes.len();
         self.rule_planes.len() + self.technique_planes.len() + further
     }
 
     /// The plane that shows the picture with half the area of gathering.
     pub fn narrow_plane(&self) -> Option<usize> {
         self.narrow_plane
+    }
+
+    /// The plane that shows the picture without light that comes straight from where it is made.
+    pub fn scattered_plane(&self) -> Option<usize> {
+        self.scattered_plane
     }
 
     /// The planes of squares of what methods add.

@@ -99,6 +99,11 @@ impl Tally {
                 if let Some(plane) = rules.narrow_plane() {
                     self.add(receiver, plane, from_eye * from_light * narrow);
                 }
+                if let Some(plane) = rules.scattered_plane()
+                    && technique.0 + technique.1 > 2
+                {
+                    self.add(receiver, plane, value);
+                }
             });
         });
     }

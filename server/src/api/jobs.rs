@@ -17,7 +17,7 @@ use axum::{
     http::{HeaderMap, HeaderValue, StatusCode, header},
     response::{IntoResponse as _, Response},
 };
-use ovtigre_core::{film::size::Region, render::pilot::Pilot, settings::Settings};
+use ovtigre_core::{film::size::Region, render::pilot::report::Pilot, settings::Settings};
 use ovtigre_proto::{
     id::JobId,
     job::{JobPatch, JobRequest},

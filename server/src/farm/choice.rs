@@ -15,7 +15,11 @@ use ovtigre_core::{
     path::expression::language::Language,
     render::{
         inspect::{IMAGE_BASED, casts},
-        pilot::{Chance, NoPilot, Pilot, Plan, pilot},
+        pilot::{
+            plan::{Chance, NoPilot, Plan},
+            report::Pilot,
+            trying::pilot,
+        },
     },
     settings::{Method, Settings, Shows},
 };
@@ -79,9 +83,8 @@ impl Farm {
             return Ok((candidates.remove(0), None));
         }
         let plan = plan(&candidates, scene);
-        let untried = plan.untried();
-        let tried = self.pilot(&candidates[0], plan).await?;
-        let method = tried.as_ref().map_or(untried, |(pilot, _)| pilot.method);
+        let tried = self.pilot(&candidates[0], &plan).await?;
+        let method = tried.as_ref().map_or_else(|_| plan.untried(), |(pilot, _)| pilot.method);
         let mut spec = candidates.swap_remove(
             candidates.iter().position(|spec| spec.settings.method == method).expect("it was tried"),
         );
@@ -101,7 +104,7 @@ impl Farm {
     async fn pilot(
         &self,
         spec: &JobSpec,
-        plan: Plan,
+        plan: &Plan,
     ) -> Result<std::result::Result<(Pilot, Sketch), NoPilot>> {
         if let Err(why) = plan.check() {
             return Ok(Err(why));
@@ -113,6 +116,7 @@ impl Farm {
             Some(EnvironmentRequest::Image(id)) => Some(self.upload_bytes("/environment", id).await?),
             Some(EnvironmentRequest::Uniform(_)) | None => None,
         };
+        let plan = plan.clone();
         blocking(move || pilot(&bytes[..], environment.as_deref(), &plan)).await
     }
 }
@@ -121,7 +125,7 @@ impl Farm {
 fn asked(settings: &Settings) -> Letters {
     let layers = settings.layers.iter().filter_map(|layer| match &layer.shows {
         Shows::Paths(paths) => Some(paths.as_str()),
-        Shows::Strategy(_) | Shows::Narrow | Shows::Squares(_) => None,
+        Shows::Strategy(_) | Shows::Narrow | Shows::Scattered | Shows::Squares(_) => None,
     });
     let paths: Vec<&str> = iter::once(settings.paths.as_str()).chain(layers).collect();
     Language::compile(&paths).map_or(Letters::NONE, |language| language.letters())
@@ -147,6 +151,7 @@ fn plan(candidates: &[JobSpec], scene: &SceneContents) -> Plan {
         error_target: spec.error_target,
         seconds: spec.seconds,
         triangles: scene.triangles_stored,
+        pixels: scene.pixels,
         chance: match (spec.settings.method, spec.by_chance) {
             (Method::Path, Some(_)) if !is_even(spec, scene) => Chance::Sometimes,
             _ => Chance::Never,

@@ -199,7 +199,7 @@ fn strategy(text: &str) -> Result<Strategy, String> {
 fn compile(chosen: &Chosen, picture: &str, note: &mut impl FnMut(&str, String)) -> Option<Language> {
     let layers = chosen.layers.iter().enumerate().filter_map(|(i, layer)| match &layer.shows {
         Shows::Paths(paths) => Some((at_layer(i), paths.as_str())),
-        Shows::Strategy(_) | Shows::Narrow | Shows::Squares(_) => None,
+        Shows::Strategy(_) | Shows::Narrow | Shows::Scattered | Shows::Squares(_) => None,
     });
     let rules: Vec<(String, &str)> =
         std::iter::once((picture.to_owned(), chosen.paths.as_str())).chain(layers).collect();

@@ -7,7 +7,7 @@ use ovtigre_core::{
         size::{Region, Size},
     },
     path::reach::Unreachable,
-    render::pilot::Pilot,
+    render::pilot::report::Pilot,
     settings::{CameraChoice, Distribution, FULL, Gloss, Method, Settings, Shadows, Shutter, Weights},
 };
 use ovtigre_proto::{id::BlobId, job::JobRequest, needs::Needs, pair::EnvironmentRequest};

@@ -83,7 +83,8 @@ impl Farm {
                     radiance.iter().copied().map(f64::from).fold(contents.brightest, f64::max);
             }
             Some(EnvironmentRequest::Image(id)) => match self.upload_at("/environment", id).await?.content {
-                SceneContent::Environment { brightest, .. } => {
+                SceneContent::Environment { width, height, brightest } => {
+                    contents.pixels += u64::from(width) * u64::from(height);
                     contents.brightest = contents.brightest.max(brightest);
                 }
                 SceneContent::Scene(_) => {

@@ -23,17 +23,22 @@ use ovtigre_core::{
     render::{
         batch::render,
         inspect::{by_chance, casts, inspect},
-        pilot::{Chance, NoPilot, Pilot, Plan, pilot},
+        pilot::{
+            plan::{Chance, NoPilot, Plan},
+            report::Pilot,
+            trying::pilot,
+        },
         prepare::{Prepared, prepare},
         progress::Progress,
     },
     settings::{FULL, Method, Settings},
 };
 use ovtigre_tests::{
+    glb::Glb,
     matrix,
     picture::settings,
     room::room,
-    scenes::{cornell, two_rooms},
+    scenes::{cornell, floor, glass, lambert, sphere, two_rooms},
     showcase::{caustic, lamp_behind_glass},
     stage,
     thread_time::thread_seconds,
@@ -110,6 +115,7 @@ fn scenes() -> Vec<(String, Vec<u8>)> {
         ("coated", matrix::coated().glb),
         ("rough-glass", matrix::ball_of_glass(0.5).glb),
         ("under-sky", under_sky()),
+        ("outdoors", outdoors()),
     ];
     scenes.into_iter().map(|(name, glb)| (name.to_owned(), glb)).collect()
 }
@@ -120,6 +126,17 @@ fn under_sky() -> Vec<u8> {
         stage::smooth_sphere(glb, stage::plastic(0.3), Vec3::new(-0.4, -0.5, 0.0), 0.45);
         stage::smooth_sphere(glb, stage::metal(0.2), Vec3::new(0.5, -0.4, 0.2), 0.4);
     })
+}
+
+/// Three balls on a wide floor, with sky in most of the picture.
+fn outdoors() -> Vec<u8> {
+    let mut glb = Glb::new();
+    glb.body(lambert(0.4, 0.0), floor(0.0, 60.0, 0.0, 0.0));
+    stage::smooth_sphere(&mut glb, stage::plastic(0.2), Vec3::new(-1.3, 0.5, 0.0), 0.5);
+    stage::smooth_sphere(&mut glb, stage::metal(0.3), Vec3::new(1.3, 0.5, 0.0), 0.5);
+    glb.body(glass(1.5), sphere(Vec3::new(0.0, 0.55, 0.3), 0.5, 24));
+    glb.perspective(Vec3::new(0.0, 0.6, 6.0), Vec3::new(0.0, 1.6, 0.0), 45.0);
+    glb.finish()
 }
 
 fn job(text: &str) -> anyhow::Result<Job> {
@@ -256,6 +273,7 @@ fn compare(name: &str, glb: &[u8], asked: &Arguments) -> anyhow::Result<String> 
             error_target: None,
             seconds: None,
             triangles: contents.report.triangles,
+            pixels: contents.report.pixels,
             chance: match by_chance(Method::Path, contents.letters, contents.brightest) {
                 None => Chance::Never,
                 Some(_) if around.lights.iter().all(|(kind, _)| *kind != LightKind::Surface) => Chance::Never,
