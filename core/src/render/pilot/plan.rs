@@ -6,15 +6,19 @@ use crate::render::batch::RenderError;
 use crate::render::prepare::PrepareError;
 use crate::settings::{Method, Settings};
 
-/// Share of a job's work that a pilot may take.
+/// Share of a job's work that a pilot may take, once the scene is read.
 pub(super) const SHARE: f64 = 0.02;
+/// Share of a job's work that reading the scene for it may take. That is no more than the 1.1 times that a pilot is to keep a job within,
+/// and models with many textures took 1.6 to 2.3 times as long by what is taken untried.
+const READING: f64 = 0.06;
 /// Sequences of each method.
 pub(super) const REPLICATES: u32 = 8;
 /// Fewest pixels of a pilot's pictures.
 const PIXELS_MIN: f64 = 48.0;
-/// Most pixels of a pilot's pictures. They should be as small as the job's: edges are noise that all methods share, and there is
-/// the more of it the larger pixels are, which speaks for the method with the cheapest samples.
-const PIXELS_MAX: f64 = 3600.0;
+/// Most pixels of a pilot's pictures. Fewer have more samples each, so that more is seen of how the errors of methods fall with more of them;
+/// but edges are noise that all methods share, and there is the more of it the larger pixels are, which speaks for the
+/// method with the cheapest samples. Of 500, 1000, 1600 and 3600 pixels, 1600 chose best in the scenes of docs/PERFORMANCE.md.
+const PIXELS_MAX: f64 = 1600.0;
 /// Triangles that are read, at most: they are in memory meanwhile.
 const TRIANGLES_MAX: u64 = 1 << 20;
 
@@ -82,22 +86,17 @@ impl Plan {
         reading(self.triangles, self.pixels)
     }
 
-    /// Pixels that may be tried in so much of the work, with a sample of each sequence: more pixels tell more than more samples.
-    fn frame(&self, work: f64) -> f64 {
+    /// Pixels that may be tried, with a sample of each sequence: more pixels tell more than more samples.
+    fn pixels_tried(&self) -> f64 {
         let all: f64 = self.methods.iter().map(|method| dearness(*method)).sum();
-        work / SAMPLE / (TELLING * f64::from(REPLICATES) * all)
-    }
-
-    /// Work that a pilot may take, reading included.
-    fn share(&self) -> f64 {
-        SHARE * SAMPLE * self.job()
+        SHARE * self.job() / (TELLING * f64::from(REPLICATES) * all)
     }
 
     /// Whether there is work enough for a pilot, before anything is read.
     pub fn check(&self) -> Result<(), NoPilot> {
-        if self.frame(self.share()) < PIXELS_MIN {
+        if self.pixels_tried() < PIXELS_MIN {
             Err(NoPilot::TooLittle)
-        } else if self.triangles > TRIANGLES_MAX || self.frame(self.share() - self.reading()) < PIXELS_MIN {
+        } else if self.triangles > TRIANGLES_MAX || self.reading() > READING * SAMPLE * self.job() {
             Err(NoPilot::TooLarge)
         } else {
             Ok(())
@@ -116,7 +115,7 @@ impl Plan {
     /// The same picture in so few pixels that it can be tried.
     pub(super) fn small(&self) -> (Settings, Region) {
         let (Size { width, height }, region) = (self.settings.size, self.region);
-        let pixels = self.frame(self.share() - self.reading()).min(PIXELS_MAX);
+        let pixels = self.pixels_tried().min(PIXELS_MAX);
         let scale = (pixels / region.pixels() as f64).sqrt().min(1.0);
         let length = |n: u32| (f64::from(n) * scale).round().max(1.0) as u32;
         let size = Size { width: length(width), height: length(height) };

@@ -14,8 +14,11 @@ pub struct Pilot {
     pub size: Size,
     /// Each method that was tried.
     pub trials: Vec<Trial>,
-    /// Work of the pilot over that of the job, as far as that is known before.
+    /// Work of the pilot over that of the job by the method that is taken, as far as that is known before.
     pub share: f64,
+    /// The same of reading the scene for it.
+    #[serde(default)]
+    pub reading: f64,
 }
 
 /// A method that was tried. Errors are those of the picture without lamps and skies that are seen directly.

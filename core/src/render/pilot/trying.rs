@@ -19,7 +19,7 @@ use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Blocks of a sequence: each but the first doubles its samples.
-const BLOCKS_MAX: u32 = 4;
+const BLOCKS_MAX: u32 = 6;
 /// Rays of a sample of the first method beyond which joining all vertices of two subpaths is not tried.
 const PATH_RAYS_MAX: f64 = 64.0;
 /// Work of a pilot, at most, in microseconds of a thread: one who submits a job waits for it, and sees its picture first.
@@ -71,7 +71,7 @@ impl Trying<'_> {
                 }
                 self.append(0, REPLICATES, block)?;
                 (1..self.all.len()).try_for_each(|method| self.append(method, REPLICATES, block))?;
-            } else if self.spent(AGAIN) > WORK_MAX.min(SHARE * self.least_work(job)) {
+            } else if self.is_enough(job) {
                 break;
             } else {
                 (0..self.all.len()).try_for_each(|method| self.append(method, REPLICATES, block))?;
@@ -113,10 +113,15 @@ impl Trying<'_> {
         work(self.all[method].0.method, self.rays(method), self.samples(method))
     }
 
-    /// Work of reading the scene and of so many times what was rendered.
-    fn spent(&self, times: f64) -> f64 {
-        let rendered = (0..self.all.len()).map(|method| self.work(method)).sum::<f64>();
-        self.plan.reading() + times * TELLING * rendered
+    /// Work of what was rendered.
+    fn spent(&self) -> f64 {
+        TELLING * (0..self.all.len()).map(|method| self.work(method)).sum::<f64>()
+    }
+
+    /// Whether another block of all takes too much of a job of so many samples, or too long.
+    fn is_enough(&self, job: f64) -> bool {
+        let then = AGAIN * self.spent();
+        then > SHARE * self.least_work(job) || self.plan.reading() + then > WORK_MAX
     }
 
     /// Work of a job of so many samples by a method, or of as many as its error asks for.
@@ -193,8 +198,9 @@ impl Trying<'_> {
             }
         };
         let trials = squares.iter().enumerate().map(trial).collect();
-        let share = (self.spent(1.0) / self.job_work(job, taken, &squares)).min(f64::MAX);
-        Pilot { method: self.all[taken].0.method, size, trials, share }
+        let of_job = |work: f64| (work / self.job_work(job, taken, &squares)).min(f64::MAX);
+        let (share, reading) = (of_job(self.spent()), of_job(self.plan.reading()));
+        Pilot { method: self.all[taken].0.method, size, trials, share, reading }
     }
 }
 

@@ -5,13 +5,13 @@ use crate::settings::Method;
 /// Reading a triangle and building its part of a tree, in microseconds of one thread.
 const TRIANGLE: f64 = 1.0;
 /// The same of a pixel of an image.
-const PIXEL: f64 = 0.01;
+const PIXEL: f64 = 0.007;
 /// The same of a sample of `path`, where nothing is known yet.
 pub(super) const SAMPLE: f64 = 1.5;
 /// Samples of `path` that a second of run time is taken for.
 pub(super) const SAMPLES_A_SECOND: f64 = 1e5;
-/// Time of a pilot over that of as many samples in a job: what it is told costs as much again as half of the paths (cornell-box: 1.5).
-pub(super) const TELLING: f64 = 1.5;
+/// Time of a pilot over that of as many samples in a job: what it is told costs two thirds of the paths again (cornell-box: 1.7).
+pub(super) const TELLING: f64 = 1.7;
 /// Times what was spent, with another block: it doubles the samples, and their rays may be a few more.
 pub(super) const AGAIN: f64 = 2.1;
 /// What the work of `path` counts: in a pilot it seems more than in a job, as with more samples of a sequence its error falls faster than
