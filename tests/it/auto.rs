@@ -164,7 +164,7 @@ fn a_pilot_takes_little_of_what_is_asked_for() {
         (Plan { samples: 4, ..plan(&ALL, 1) }, "too small"),
         (Plan { seconds: Some(0.1), ..plan(&ALL, 4096) }, "too small"),
         (Plan { triangles: 1 << 21, ..plan(&ALL, 1 << 20) }, "reading the scene once more"),
-        (Plan { pixels: 1 << 24, ..plan(&ALL, 256) }, "reading the scene once more"),
+        (Plan { pixels: 1 << 26, ..plan(&ALL, 32) }, "reading the scene once more"),
     ] {
         let refused: NoPilot = pilot(&glb[..], None, &change).unwrap_err();
         assert!(refused.to_string().contains(why), "{refused}");

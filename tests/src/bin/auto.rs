@@ -2,6 +2,8 @@
 //! `cargo run --release -p ovtigre-tests --bin auto -- [--scene NAME] [--file SCENE.glb]… [--jobs WIDTHxSAMPLES,…] [--seeds N] [--runs N]`.
 //! Where files are given, only these are tried. True errors are over so many runs: one may happen not to meet what others do.
 //!
+//! Errors are compared after the same time. Each method renders 1, 2, 4 … samples, and between two of these its error is taken to fall as
+//! a power of them, so that none is compared with the advantage that the sampler has at powers of two.
 //! Time is that of one thread on a processor, so that others on the machine count little; methods take turns.
 
 use anyhow::{Context as _, bail};
@@ -54,7 +56,7 @@ const SIZE: Size = Size { width: 96, height: 54 };
 /// Seed of references; what is compared has others.
 const REFERENCE_SEED: u64 = u64::MAX;
 /// Time of a reference over that of the longest of what is compared with it.
-const REFERENCE: f64 = 4.0;
+const REFERENCE: f64 = 8.0;
 
 /// A job of a frame so wide, 16:9, with so many samples a pixel.
 #[derive(Clone, Copy, Debug)]
@@ -144,42 +146,40 @@ fn job(text: &str) -> anyhow::Result<Job> {
     Ok(Job { width: width.parse()?, samples: samples.parse()? })
 }
 
-/// A method on trial, and what it did in its time.
+/// A method on trial, with more and more samples.
 struct Measured {
     settings: Settings,
     lanes: Vec<Prefix>,
-    /// Of each replicate.
-    samples: u32,
     seconds: f64,
-    error: f64,
+    /// Of the true error, after each block.
+    squares: Vec<f64>,
 }
 
 impl Measured {
     fn new(method: Method, settings: &Settings) -> Self {
         let lanes = (0..settings.replicates).map(|r| Prefix::empty(settings.size.frame(), r, 1)).collect();
         let settings = Settings { method, ..settings.clone() };
-        Self { settings, lanes, samples: 1, seconds: 0.0, error: 0.0 }
+        Self { settings, lanes, seconds: 0.0, squares: Vec::new() }
     }
 
     /// Seconds of one sample of all pixels of a replicate.
     fn once(&self, prepared: &Prepared) -> f64 {
         let start = thread_seconds();
-        self.block(prepared, 0, 4);
+        self.block(prepared, 0, Block { index: 0, start: 0, count: 4 });
         0.25 * (thread_seconds() - start)
     }
 
-    fn block(&self, prepared: &Prepared, replicate: u32, count: u32) -> Sum {
-        let block = Block { index: 0, start: 0, count };
+    fn block(&self, prepared: &Prepared, replicate: u32, block: Block) -> Sum {
         let batch = Batch { region: self.settings.size.frame(), replicate, block };
         render(prepared, &self.settings, batch, &Progress::new()).expect("not stopped")
     }
 
-    /// Renders one replicate.
-    fn take_turn(&mut self, prepared: &Prepared, replicate: u32) {
+    /// Renders a block of one replicate.
+    fn take_turn(&mut self, prepared: &Prepared, replicate: u32, index: u32) {
         let start = thread_seconds();
-        let sum = self.block(prepared, replicate, self.samples);
+        let sum = self.block(prepared, replicate, doubling(index));
         self.seconds += thread_seconds() - start;
-        self.lanes[replicate as usize].append(&sum).expect("the first");
+        self.lanes[replicate as usize].append(&sum).expect("blocks come in order");
     }
 
     fn picture(&self) -> Picture {
@@ -192,17 +192,32 @@ impl Measured {
 
     /// Samples of all pixels and replicates.
     fn all_samples(&self) -> f64 {
-        f64::from(self.samples * self.settings.replicates) * self.settings.size.pixels() as f64
+        let each = self.lanes.iter().map(|lane| f64::from(lane.samples()));
+        each.sum::<f64>() * self.settings.size.pixels() as f64
     }
 
     fn seconds_a_sample(&self) -> f64 {
         self.seconds / self.all_samples()
     }
 
-    /// The time for an error is in proportion to it.
-    fn cost(&self) -> f64 {
-        self.error * self.error * self.seconds
+    /// Samples of a pixel in so many seconds, over all replicates.
+    fn samples_in(&self, seconds: f64) -> f64 {
+        seconds / (self.seconds_a_sample() * self.settings.size.pixels() as f64)
     }
+
+    /// Of the true error after so many seconds: between two blocks a power of the samples.
+    fn square_in(&self, seconds: f64) -> f64 {
+        let doublings = (self.samples_in(seconds) / f64::from(self.settings.replicates)).log2();
+        let before = (doublings.max(0.0) as usize).min(self.squares.len() - 2);
+        let [from, to] = [self.squares[before], self.squares[before + 1]];
+        from * (to / from).powf(doublings - before as f64)
+    }
+}
+
+/// Each block but the first doubles the samples.
+fn doubling(index: u32) -> Block {
+    let start = if index == 0 { 0 } else { 1 << (index - 1) };
+    Block { index, start, count: start.max(1) }
 }
 
 /// A picture that is known well enough for a job of so many samples by `path`.
@@ -211,13 +226,14 @@ fn reference(prepared: &Prepared, settings: &Settings, samples: u32) -> Referenc
         Measured::new(Method::Path, settings).once(prepared) * f64::from(samples / REPLICATES_OF_A_JOB);
     let other = Settings { seed: REFERENCE_SEED, ..settings.clone() };
     let mut reference = Measured::new(Method::Bidirectional, &other);
-    reference.samples = (REFERENCE * seconds / reference.once(prepared)).log2().round().exp2() as u32;
-    (0..settings.replicates).for_each(|replicate| reference.take_turn(prepared, replicate));
+    let doublings = (REFERENCE * seconds / reference.once(prepared)).log2().round().max(1.0) as u32;
+    for index in 0..=doublings {
+        (0..settings.replicates).for_each(|replicate| reference.take_turn(prepared, replicate, index));
+    }
     Reference::of_picture(&reference.picture())
 }
 
-/// Every method, in about the time of so many samples by `path`: how the error falls with more of them differs. Errors are root mean
-/// squares over the runs.
+/// Every method, for the time of so many samples by `path` and until its samples are a power of two. Squares of errors are means over the runs.
 fn measure(
     prepared: &Prepared,
     settings: &Settings,
@@ -226,32 +242,36 @@ fn measure(
 ) -> Vec<Measured> {
     let once = METHODS.map(|method| Measured::new(method, settings).once(prepared));
     let by_path = f64::from(samples / REPLICATES_OF_A_JOB);
-    let sized = once.map(|seconds| (by_path * once[0] / seconds).log2().round().exp2().max(1.0) as u32);
+    // The next power of two, but for a little that may be wrong with what is taken for the time of a sample.
+    let doublings = |seconds: f64| ((by_path * once[0] / seconds).log2() - 0.1).ceil().max(1.0) as u32;
+    let sized = once.map(|seconds| doublings(seconds) + 1);
     let mut all: Vec<Measured> = Vec::new();
     for run in 0..runs {
         let settings = Settings { seed: settings.seed + run, ..settings.clone() };
-        let start = |(method, samples)| Measured { samples, ..Measured::new(method, &settings) };
-        let mut these: Vec<Measured> = METHODS.into_iter().zip(sized).map(start).collect();
-        for replicate in 0..settings.replicates {
-            for one in &mut these {
-                one.take_turn(prepared, replicate);
+        let mut these: Vec<Measured> =
+            METHODS.iter().map(|method| Measured::new(*method, &settings)).collect();
+        for index in 0..sized.into_iter().fold(0, u32::max) {
+            for replicate in 0..settings.replicates {
+                let going = these.iter_mut().zip(sized).filter(|(_, blocks)| index < *blocks);
+                going.for_each(|(one, _)| one.take_turn(prepared, replicate, index));
             }
-        }
-        for one in &mut these {
-            one.error = reference.relative_error(&one.picture().planes[0]);
+            for (one, _) in these.iter_mut().zip(sized).filter(|(_, blocks)| index < *blocks) {
+                let error = reference.relative_error(&one.picture().planes[0]);
+                one.squares.push(error * error);
+            }
         }
         if run == 0 {
             all = these;
         } else {
             for (one, other) in all.iter_mut().zip(these) {
                 one.seconds += other.seconds;
-                one.error = one.error.hypot(other.error);
+                one.squares.iter_mut().zip(other.squares).for_each(|(sum, square)| *sum += square);
             }
         }
     }
     for one in &mut all {
         one.seconds /= runs as f64;
-        one.error /= (runs as f64).sqrt();
+        one.squares.iter_mut().for_each(|square| *square /= runs as f64);
     }
     all
 }
@@ -290,18 +310,19 @@ fn compare(name: &str, glb: &[u8], asked: &Arguments) -> anyhow::Result<String> 
     let longest = asked.jobs.iter().map(|job| job.samples).max().context("there are no jobs")?;
     let reference = reference(&prepared, &small, longest);
     let mut out = format!("{name}: the reference is known to {:.4}\n", reference.own_error());
-    let mut measured: Vec<Measured> = Vec::new();
+    let measured = measure(&prepared, &small, longest, (&reference, asked.runs));
+    let open: Vec<&Measured> = measured.iter().filter(|one| is_open(&one.method())).collect();
+    let pixels = SIZE.pixels() as f64;
     for (i, job) in asked.jobs.iter().enumerate() {
         let tried: Vec<Tried> = (0..asked.seeds).map(|seed| Tried::new(glb, &plan(*job, seed))).collect();
+        // That of as many samples of each replicate by `path`.
+        let samples = f64::from(job.samples / REPLICATES_OF_A_JOB * REPLICATES);
+        let seconds = measured[0].seconds_a_sample() * pixels * samples;
+        let best = open.iter().map(|one| one.square_in(seconds)).fold(f64::INFINITY, f64::min);
         if i == 0 || asked.jobs[i - 1].samples != job.samples {
-            measured = measure(&prepared, &small, job.samples, (&reference, asked.runs));
+            fixed(&mut out, (&measured, &tried[0]), (seconds, best))?;
         }
-        let open: Vec<&Measured> = measured.iter().filter(|one| is_open(&one.method())).collect();
-        let best = open.iter().map(|one| one.cost()).fold(f64::INFINITY, f64::min);
-        if i == 0 || asked.jobs[i - 1].samples != job.samples {
-            fixed(&mut out, &measured, best, &tried[0])?;
-        }
-        chosen(&mut out, *job, &tried, (&open, best))?;
+        chosen(&mut out, *job, &tried, (&open, seconds, best))?;
     }
     Ok(out)
 }
@@ -323,7 +344,11 @@ impl Tried {
 }
 
 /// Each method, and what the first pilot says of it.
-fn fixed(out: &mut String, measured: &[Measured], best: f64, tried: &Tried) -> anyhow::Result<()> {
+fn fixed(
+    out: &mut String,
+    (measured, tried): (&[Measured], &Tried),
+    (seconds, best): (f64, f64),
+) -> anyhow::Result<()> {
     writeln!(
         out,
         "\n| method | samples | rays a sample | µs a sample | true error | time for the same error | by the pilot |"
@@ -345,13 +370,13 @@ fn fixed(out: &mut String, measured: &[Measured], best: f64, tried: &Tried) -> a
         let rays: u64 = one.lanes.iter().map(Prefix::rays).sum();
         writeln!(
             out,
-            "| {} | {} | {:.2} | {:.2} | {:.4} | {:.2} | {by_pilot} |",
+            "| {} | {:.0} | {:.2} | {:.2} | {:.4} | {:.2} | {by_pilot} |",
             one.method().name(),
-            one.samples * one.settings.replicates,
+            one.samples_in(seconds),
             rays as f64 / one.all_samples(),
             1e6 * one.seconds_a_sample(),
-            one.error,
-            one.cost() / best,
+            one.square_in(seconds).sqrt(),
+            one.square_in(seconds) / best,
         )?;
     }
     writeln!(out)?;
@@ -363,7 +388,7 @@ fn chosen(
     out: &mut String,
     job: Job,
     tried: &[Tried],
-    (open, best): (&[&Measured], f64),
+    (open, seconds, best): (&[&Measured], f64, f64),
 ) -> anyhow::Result<()> {
     let all = tried.len() as f64;
     let pixels = f64::from(job.width * (job.width * 9 / 16));
@@ -372,7 +397,7 @@ fn chosen(
     for one in tried {
         let taken = open.iter().find(|measured| measured.method() == one.method).context("one of them")?;
         let share = one.seconds / (taken.seconds_a_sample() * pixels * f64::from(job.samples));
-        rows.push((share, taken.cost() / best * (1.0 + share)));
+        rows.push((share, taken.square_in(seconds) / best * (1.0 + share)));
     }
     let mean = |of: &dyn Fn(&(f64, f64)) -> f64| rows.iter().map(of).sum::<f64>() / all;
     let taken: Vec<String> = (open.iter())
@@ -381,7 +406,7 @@ fn chosen(
         .map(|(method, times)| format!("{} {times}", method.name()))
         .collect();
     let worst = rows.iter().map(|row| row.1).fold(0.0, f64::max);
-    let worst_fixed = open.iter().map(|one| one.cost()).fold(0.0, f64::max) / best;
+    let worst_fixed = open.iter().map(|one| one.square_in(seconds)).fold(0.0, f64::max) / best;
     let counted = tried.iter().flat_map(|one| &one.found).map(|pilot| pilot.share).fold(0.0, f64::max);
     writeln!(
         out,

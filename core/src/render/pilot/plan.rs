@@ -9,7 +9,7 @@ use crate::settings::{Method, Settings};
 /// Share of a job's work that a pilot may take, once the scene is read.
 pub(super) const SHARE: f64 = 0.02;
 /// Share of a job's work that reading the scene for it may take. That is no more than the 1.1 times that a pilot is to keep a job within,
-/// and models with many textures took 1.6 to 2.3 times as long by what is taken untried.
+/// and models with many textures take 1.4 to 2.1 times as long by what is taken untried.
 const READING: f64 = 0.06;
 /// Sequences of each method.
 pub(super) const REPLICATES: u32 = 8;
