@@ -17,7 +17,8 @@ pub(super) const REPLICATES: u32 = 8;
 const PIXELS_MIN: f64 = 48.0;
 /// Most pixels of a pilot's pictures. Fewer have more samples each, so that more is seen of how the errors of methods fall with more of them;
 /// but edges are noise that all methods share, and there is the more of it the larger pixels are, which speaks for the
-/// method with the cheapest samples. Of 500, 1000, 1600 and 3600 pixels, 1600 chose best in the scenes of docs/PERFORMANCE.md.
+/// method with the cheapest samples. Of 500, 1000, 1600 and 3600 pixels, 1600 chose best in the scenes of docs/PERFORMANCE.md
+/// (by errors at numbers of samples that are powers of two, which is less fair than what stands there now).
 const PIXELS_MAX: f64 = 1600.0;
 /// Triangles that are read, at most: they are in memory meanwhile.
 const TRIANGLES_MAX: u64 = 1 << 20;
