@@ -55,8 +55,8 @@ impl Conductor {
         let (wo, wi) = (upward(wo), upward(wi));
         let (o, i) = (rough.see(wo), rough.see(wi));
         let (glossy, [pdf_single, pdf_multiple]) = rough.evaluate(wo, wi, &o, &i);
-        let first = share_of_first_bounce(&o);
-        let pdf = first * pdf_single + (1.0 - first) * pdf_multiple;
+        let facets = share_of_facets(rough, &o);
+        let pdf = facets * pdf_single + (1.0 - facets) * pdf_multiple;
         Evaluated { value: Scattered { diffuse: Rgb::ZERO, glossy }, pdf }
     }
 
@@ -64,7 +64,7 @@ impl Conductor {
         let above = upward(wo);
         let wi = match &self.gloss {
             Gloss::Smooth(_) => return Some(self.draw_mirror(wo, Letter::Specular)),
-            Gloss::Rough(rough) => match split(u_lobe, share_of_first_bounce(&rough.see(above))) {
+            Gloss::Rough(rough) => match split(u_lobe, share_of_facets(rough, &rough.see(above))) {
                 Ok(_) => rough.draw_single(above, u),
                 Err(_) => rough.between.draw(u),
             },
@@ -79,7 +79,12 @@ pub(super) fn upward(w: Vec3) -> Vec3 {
     w.with_z(w.z.abs())
 }
 
-fn share_of_first_bounce(o: &Seen) -> f32 {
+/// The probability with which a direction is drawn off a facet.
+///
+/// What white metals make of light is multiplied by a weight at each of many scatterings between them: single samples of thousands of times
+/// the mean come of weights that vary. With the first bounce always drawn off facets their mean square was 1.13 at α = 1, 1.16 at 0.64 and
+/// 1.06 at 0.25, over 30 scatterings at α = 1 so 40; it is 1.003, 1.055 and 1.045.
+fn share_of_facets(rough: &RoughGloss, o: &Seen) -> f32 {
     let [single, multiple] = RoughGloss::weights(o);
-    if single + multiple > 0.0 { single / (single + multiple) } else { 1.0 }
+    if single + multiple > 0.0 { single * (1.0 - rough.evenly(o)) / (single + multiple) } else { 1.0 }
 }

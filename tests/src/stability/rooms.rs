@@ -44,7 +44,7 @@ fn metal(roughness: f32) -> Value {
 /// What is to be known of a material.
 fn note(name: &str) -> &'static str {
     if name.ends_with("0.8") {
-        "The weight of a sample is 1 in the mean and varies; where hardly anything is absorbed its square grows from reflection to reflection. Few paths count for very many, and the error is underestimated."
+        "The weight of a sample is 1 in the mean and varies a little; where hardly anything is absorbed its square grows from reflection to reflection."
     } else {
         ""
     }

@@ -27,9 +27,9 @@ fn expected(bsdf: &Bsdf, wo: Vec3, chart: &Chart) -> Vec<f64> {
     let (mut cells, mut cut) = (vec![0.0; RADIAL * AROUND], vec![false; RADIAL * AROUND]);
     for (k, (value, cut)) in cells.iter_mut().zip(&mut cut).enumerate() {
         let ((coarse, _), (fine, outside)) =
-            (cell(k / AROUND, k % AROUND, 3), cell(k / AROUND, k % AROUND, 5));
+            (cell(k / AROUND, k % AROUND, 5), cell(k / AROUND, k % AROUND, 11));
         *value = fine;
-        *cut = (coarse - fine).abs() > 0.003 * fine + 1e-8 || (1..25).contains(&outside);
+        *cut = (coarse - fine).abs() > 0.003 * fine + 1e-8 || (1..121).contains(&outside);
     }
     for i in 0..RADIAL {
         for j in 0..AROUND {
