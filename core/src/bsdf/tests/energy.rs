@@ -35,7 +35,7 @@ fn mean_square(bsdf: &Bsdf, wo: Vec3) -> f64 {
     (0..SAMPLES).map(|_| square().unwrap_or(0.0)).sum::<f64>() / SAMPLES as f64
 }
 
-/// What light is multiplied by at each of many scatterings between white metals: with a mean square of 1.13, as it once was at α = 1, thirty of
+/// What light is multiplied by at each of many scatterings between white metals: with a mean square of 1.13, that of facets alone at α = 1, thirty of
 /// them make single samples of thousands of times the mean.
 #[test]
 fn weights_of_white_metal_vary_little() {
