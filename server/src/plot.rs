@@ -2,7 +2,7 @@
 
 use ovtigre_proto::curve::{Curve, CurveRow};
 use plotters::{
-    coord::combinators::{IntoLogRange as _, LogCoord},
+    coord::combinators::{BindKeyPoints as _, IntoLogRange as _, LogCoord, WithKeyPoints},
     prelude::*,
 };
 
@@ -18,7 +18,8 @@ const COLOURS: [RGBColor; 6] = [
 ];
 const TARGET: RGBColor = RGBColor(190, 30, 45);
 
-type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<LogCoord<f64>, LogCoord<f64>>>;
+type Axis = WithKeyPoints<LogCoord<f64>>;
+type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<Axis, Axis>>;
 type Drawn = Result<(), DrawingAreaErrorKind<std::io::Error>>;
 
 /// What is known of one render. Points are seconds and relative errors.
@@ -79,12 +80,11 @@ fn draw(backend: SVGBackend<'_>, title: &str, traces: &[Trace], target: Option<f
     };
     let mut builder = ChartBuilder::on(&root);
     builder.caption(title, ("sans-serif", 20)).margin(14).x_label_area_size(44).y_label_area_size(66);
-    let (x, y) = ((times[0]..times[1]).log_scale(), (errors[0]..errors[1]).log_scale());
-    let mut chart = builder.build_cartesian_2d(x, y)?;
+    let mut chart = builder.build_cartesian_2d(axis(times), axis(errors))?;
     let mut mesh = chart.configure_mesh();
     mesh.x_desc("run time in seconds").y_desc("relative error").label_style(("sans-serif", 14));
     mesh.light_line_style(RGBColor(238, 238, 238)).bold_line_style(RGBColor(215, 215, 215));
-    mesh.max_light_lines(3).x_labels(14).x_label_formatter(&number).y_label_formatter(&number).draw()?;
+    mesh.x_label_formatter(&number).y_label_formatter(&number).draw()?;
     if let Some(target) = target {
         let line = LineSeries::new([(times[0], target), (times[1], target)], TARGET.stroke_width(2));
         chart
@@ -158,6 +158,34 @@ fn ranges(traces: &[Trace], target: Option<f64>) -> Option<[[f64; 2]; 2]> {
     Some([span(&mut points.iter().map(|p| p[0])), span(&mut errors.into_iter())])
 }
 
+/// A logarithmic axis, with a line at each digit of each power of ten, and labels at as many of them as there is room for.
+fn axis([low, high]: [f64; 2]) -> Axis {
+    (low..high)
+        .log_scale()
+        .with_key_points(marks([low, high], labelled(high / low)))
+        .with_light_points(marks([low, high], &DIGITS))
+}
+
+const DIGITS: [f64; 9] = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0];
+
+/// What is labelled of each power of ten on an axis whose end is so many times its start.
+fn labelled(ratio: f64) -> &'static [f64] {
+    match ratio {
+        ..3.0 => &[1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0],
+        ..100.0 => &[1.0, 2.0, 3.0, 5.0],
+        ..1e4 => &[1.0, 3.0],
+        _ => &[1.0],
+    }
+}
+
+/// The multiples of powers of ten in a range: of all powers, or of each second one and so on where there are more than twelve.
+fn marks([low, high]: [f64; 2], digits: &[f64]) -> Vec<f64> {
+    let [first, last] = [low, high].map(|value| value.log10().floor() as i32);
+    let powers = (first..=last).step_by(1 + (last - first) as usize / 12);
+    let all = powers.flat_map(|power| digits.iter().map(move |digit| digit * 10.0_f64.powi(power)));
+    all.filter(|mark| (low..=high).contains(mark)).collect()
+}
+
 /// A number as short as it can be.
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "as labels are formatted")]
 fn number(value: &f64) -> String {
@@ -191,6 +219,21 @@ mod tests {
         }
         assert!(!text.contains("NaN") && !text.contains("inf"), "{text}");
         assert_eq!(text.matches("<circle").count(), 6);
+    }
+
+    #[test]
+    fn marks_are_all_over_the_axis_and_each_is_there_once() {
+        let close = |found: Vec<f64>, expected: &[f64]| {
+            assert_eq!(found.len(), expected.len(), "{found:?}");
+            assert!(found.iter().zip(expected).all(|(a, b)| (a / b - 1.0).abs() < 1e-12), "{found:?}");
+        };
+        let of = |range: [f64; 2]| marks(range, labelled(range[1] / range[0]));
+        close(of([0.55, 24.0]), &[1.0, 2.0, 3.0, 5.0, 10.0, 20.0]);
+        close(of([0.019, 0.33]), &[0.02, 0.03, 0.05, 0.1, 0.2, 0.3]);
+        close(of([1.01, 1.58]), &[1.2, 1.5]);
+        close(of([0.02, 90.0]), &[0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0]);
+        close(of([0.5, 2e5]), &[1.0, 10.0, 100.0, 1e3, 1e4, 1e5]);
+        assert!((1..=12).contains(&of([1e-30, 1e30]).len()));
     }
 
     #[test]
