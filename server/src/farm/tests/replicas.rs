@@ -80,31 +80,34 @@ async fn whoever_is_left_goes_on_appending() {
     let Some((farms, database, folder)) = farms::<2>("left").await else { return };
     let [first, mut other] = farms;
     let job = first.job(SAMPLES, |_| ()).await;
-    let mut hands: Vec<Lease> = Vec::new();
     let worker = first.worker().await;
-    hands.extend(first.take(&worker, 12).await);
+    let mut hands: Vec<Lease> = first.take(&worker, 12).await;
+    let (mut taken, mut deaths) = (hands.len() as u64, 1);
     for lease in hands.drain(..6) {
         first.bring(&lease, Spread::Noisy).await;
     }
     first.until(&job, |status| status.batches_done > 0).await;
     first.die().await;
-    let mut deaths = 1;
     loop {
-        hands.extend(other.take(&worker, 4).await);
-        if hands.is_empty() {
-            if other.farm.status(&job).await.unwrap().state.is_over() {
-                break;
-            }
-            tokio::time::sleep(Duration::from_millis(5)).await;
-            continue;
+        let status = other.farm.status(&job).await.unwrap();
+        if status.state.is_over() {
+            break;
         }
-        let lease = hands.remove(hands.len() / 2);
-        other.bring(&lease, Spread::Noisy).await;
-        let done = other.farm.status(&job).await.unwrap().batches_done;
-        if deaths < 4 && done > 8 * deaths {
+        if deaths < 4 && status.batches_done > 8 * deaths {
             deaths += 1;
             let next = Bench::replica(&database, folder.path(), quick()).await;
             std::mem::replace(&mut other, next).die().await;
+        }
+        // No more than seven are open, or the picture might be whole before all have died that are to.
+        if taken < status.batches_done + 4 {
+            let more = other.take(&worker, 4).await;
+            taken += more.len() as u64;
+            hands.extend(more);
+        }
+        if hands.is_empty() {
+            tokio::time::sleep(Duration::from_millis(5)).await;
+        } else {
+            other.bring(&hands.remove(hands.len() / 2), Spread::Noisy).await;
         }
     }
     let status = other.until_settled(&job, JobState::Done).await;
